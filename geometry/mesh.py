@@ -1,0 +1,150 @@
+"""The triangle mesh as it was read: checked, ordered, immutable."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from nonrigid.geometry.arrays import FloatArray, IntArray
+from nonrigid.geometry.errors import InputError
+
+
+@dataclass(frozen=True, eq=False)
+class Mesh:
+    """Hold the vertices and triangles of a surface exactly as given, in their own order.
+
+    Ground truth refers to the numbers of vertices and faces in the file, so a `Mesh` is never repaired in place: see
+    `nonrigid.geometry.clean` for the derived view on which solvers run.
+
+    Parameters
+    ----------
+    vertices
+        (n, 3) coordinates, in the unit of the file.
+    faces
+        (m, 3) vertex numbers, 0-based.
+    name
+        Shown in messages and tables; it changes no result.
+
+    Raises
+    ------
+    InputError
+        If there are no faces, a coordinate is not finite, or an index is out of range.
+
+    Examples
+    --------
+    >>> triangle = Mesh([[0, 0, 0], [1, 0, 0], [0, 2, 0]], [[0, 1, 2]])
+    >>> triangle.area, triangle.vertices.shape
+    (1.0, (3, 3))
+    """
+
+    vertices: FloatArray
+    faces: IntArray
+    name: str = field(default="mesh", kw_only=True)
+
+    def __init__(self, vertices: ArrayLike, faces: ArrayLike, *, name: str = "mesh") -> None:
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "vertices", _checked_vertices(vertices))
+        object.__setattr__(self, "faces", _checked_faces(faces, len(self.vertices)))
+
+    @cached_property
+    def face_areas(self) -> FloatArray:
+        """(m,) triangle areas, in the squared unit of the vertices."""
+        return np.asarray(0.5 * np.linalg.norm(self._cross, axis=1))
+
+    @cached_property
+    def area(self) -> float:
+        """Total area, in the squared unit of the vertices."""
+        return float(self.face_areas.sum())
+
+    @cached_property
+    def vertex_areas(self) -> FloatArray:
+        """(n,) a third of the area of the incident triangles; sums to `area`."""
+        share = np.repeat(self.face_areas / 3.0, 3)
+        return np.bincount(self.faces.ravel(), weights=share, minlength=len(self.vertices))
+
+    @cached_property
+    def vertex_normals(self) -> FloatArray:
+        """(n, 3) area-weighted unit normals; zero where a vertex has no area."""
+        normals = np.zeros_like(self.vertices)
+        for corner in range(3):
+            np.add.at(normals, self.faces[:, corner], self._cross)
+        length = np.linalg.norm(normals, axis=1, keepdims=True)
+        return np.asarray(np.divide(normals, length, out=np.zeros_like(normals), where=length > 0))
+
+    @cached_property
+    def edges(self) -> IntArray:
+        """(e, 2) undirected edges, smaller vertex number first, each once."""
+        return self._edges_and_counts[0]
+
+    @cached_property
+    def boundary_edges(self) -> IntArray:
+        """(b, 2) undirected edges that exactly one triangle uses."""
+        edges, counts = self._edges_and_counts
+        return edges[counts == 1]
+
+    @cached_property
+    def boundary_vertices(self) -> IntArray:
+        """Sorted numbers of the vertices on the boundary."""
+        return np.unique(self.boundary_edges)
+
+    @cached_property
+    def component_of_vertex(self) -> IntArray:
+        """(n,) number of the connected component (through shared vertices) each vertex lies in."""
+        i, j = self.edges.T
+        n = len(self.vertices)
+        graph = coo_array((np.ones(len(i)), (i, j)), shape=(n, n))
+        return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+
+    def transformed(
+        self, *, rotation: ArrayLike | None = None, translation: ArrayLike = 0.0, scale: float = 1.0
+    ) -> Mesh:
+        """Return the mesh with vertices `scale * rotation @ v + translation`, faces and name unchanged."""
+        turned = self.vertices if rotation is None else self.vertices @ np.asarray(rotation, dtype=float).T
+        return Mesh(scale * turned + np.asarray(translation, dtype=float), self.faces, name=self.name)
+
+    @cached_property
+    def _cross(self) -> FloatArray:
+        a, b, c = (self.vertices[self.faces[:, corner]] for corner in range(3))
+        return np.cross(b - a, c - a)
+
+    @cached_property
+    def _edges_and_counts(self) -> tuple[IntArray, IntArray]:
+        directed = self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+        edges, counts = np.unique(np.sort(directed, axis=1), axis=0, return_counts=True)
+        return edges, counts.astype(np.int64)
+
+
+def _checked_vertices(vertices: ArrayLike) -> FloatArray:
+    array = np.array(vertices, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise InputError(f"vertices have shape {array.shape}, not (n, 3)", remedy="give one row of x y z a vertex")
+    bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
+    if len(bad):
+        raise InputError(
+            f"{len(bad)} vertices are not finite, the first is vertex {bad[0]} (0-based)",
+            remedy="remove or mend these vertices",
+        )
+    array.setflags(write=False)
+    return array
+
+
+def _checked_faces(faces: ArrayLike, vertex_count: int) -> IntArray:
+    array = np.array(faces)
+    if array.size == 0:
+        raise InputError("the mesh has no faces", remedy="give a triangle mesh, not a point cloud")
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise InputError(f"faces have shape {array.shape}, not (m, 3)", remedy="triangulate the mesh first")
+    array = array.astype(np.int64)
+    bad = np.flatnonzero(((array < 0) | (array >= vertex_count)).any(axis=1))
+    if len(bad):
+        raise InputError(
+            f"face {bad[0]} (0-based) names vertex {array[bad[0]].max()} of {vertex_count}",
+            remedy="vertex numbers run from 0 to the number of vertices less one",
+        )
+    array.setflags(write=False)
+    return array
