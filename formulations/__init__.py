@@ -1,0 +1,1 @@
+"""What a good match would be: methods stated as declarative optimization problems."""

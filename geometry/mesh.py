@@ -65,7 +65,7 @@ class Mesh:
     def vertex_areas(self) -> FloatArray:
         """(n,) a third of the area of the incident triangles; sums to `area`."""
         share = np.repeat(self.face_areas / 3.0, 3)
-        return np.bincount(self.faces.ravel(), weights=share, minlength=len(self.vertices))
+        return np.asarray(np.bincount(self.faces.ravel(), share, len(self.vertices)), dtype=np.float64)
 
     @cached_property
     def vertex_normals(self) -> FloatArray:
@@ -85,7 +85,7 @@ class Mesh:
     def boundary_edges(self) -> IntArray:
         """(b, 2) undirected edges that exactly one triangle uses."""
         edges, counts = self._edges_and_counts
-        return edges[counts == 1]
+        return np.asarray(edges[counts == 1])
 
     @cached_property
     def boundary_vertices(self) -> IntArray:

@@ -1,0 +1,1 @@
+"""How a match is found, and how sure we are of it."""

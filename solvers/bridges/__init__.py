@@ -1,0 +1,1 @@
+"""Bridges: one module a reformulation."""

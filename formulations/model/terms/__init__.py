@@ -1,0 +1,1 @@
+"""Terms: formulas that an objective is a sum of."""

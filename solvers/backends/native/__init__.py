@@ -1,0 +1,1 @@
+"""Specialised dynamics: one module each."""

@@ -1,0 +1,166 @@
+"""A problem: one objective, each variable in a set, and named constraints; plain data that names no solver."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from types import MappingProxyType
+
+import numpy as np
+
+from nonrigid.formulations.model.sets import SmoothConstraint
+from nonrigid.formulations.model.term import Applied, Curvature, ModelError, Sum
+from nonrigid.formulations.model.variable import Membership, Variable
+from nonrigid.geometry.arrays import FloatArray
+
+
+class Sense(Enum):
+    """Say whether the objective is sought large or small."""
+
+    MINIMIZE = "minimize"
+    MAXIMIZE = "maximize"
+
+
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """Hold a sum of weighted terms, a constant, and the sense in which it is sought."""
+
+    sense: Sense
+    terms: tuple[Applied, ...]
+    constant: float = 0.0
+
+    def value(self, values: Mapping[str, FloatArray]) -> float:
+        """Return the objective in the user's own sense."""
+        return self.constant + sum(term.value_and_gradient(values)[0] for term in self.terms)
+
+    def value_and_gradient(self, values: Mapping[str, FloatArray]) -> tuple[float, dict[str, FloatArray]]:
+        """Return the objective in the user's own sense, and its gradient by variable name."""
+        total, gradient = self.constant, {name: np.zeros_like(value) for name, value in values.items()}
+        for term in self.terms:
+            value, parts = term.value_and_gradient(values)
+            total += value
+            for name, part in parts.items():
+                gradient[name] += part
+        return total, gradient
+
+
+def maximize(expression: Applied | Sum) -> Objective:
+    """State that an expression is sought large."""
+    return Objective(Sense.MAXIMIZE, expression.terms if isinstance(expression, Sum) else (expression,))
+
+
+def minimize(expression: Applied | Sum) -> Objective:
+    """State that an expression is sought small."""
+    return Objective(Sense.MINIMIZE, expression.terms if isinstance(expression, Sum) else (expression,))
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    r"""State an optimization problem as functions in sets.
+
+    Parameters
+    ----------
+    name
+        Stage name under which a backend can be chosen for it.
+    objective
+        Made by `maximize` or `minimize`.
+    memberships
+        One `variable @ set` for each variable.
+    constraints
+        Named smooth constraints on one variable: name -> (variable, constraint).
+
+    Raises
+    ------
+    ModelError
+        If a variable of the objective has no set, or has two.
+
+    Examples
+    --------
+    >>> from nonrigid.formulations.model import QuadraticForm, Simplex
+    >>> u = Variable("u", 2)
+    >>> game = Problem("game", maximize(QuadraticForm(np.array([[0.0, 1.0], [1.0, 0.0]]))(u)), u @ Simplex())
+    >>> print(game)
+    game: maximize QuadraticForm(u)
+      subject to u in Simplex()
+      with u of shape (2,)
+    >>> print(game.latex())
+    \max_{u}\; u^\top A u \quad\text{s.t.}\quad u \ge 0,\ 1^\top u = 1
+    """
+
+    name: str
+    objective: Objective
+    memberships: tuple[Membership, ...]
+    constraints: Mapping[str, tuple[Variable, SmoothConstraint]] = field(default_factory=lambda: MappingProxyType({}))
+
+    def __init__(
+        self,
+        name: str,
+        objective: Objective,
+        *memberships: Membership,
+        constraints: Mapping[str, tuple[Variable, SmoothConstraint]] | None = None,
+    ) -> None:
+        object.__setattr__(self, "name", name)
+        object.__setattr__(self, "objective", objective)
+        object.__setattr__(self, "memberships", memberships)
+        object.__setattr__(self, "constraints", dict(constraints or {}))
+        names = [variable.name for variable in self.variables]
+        if len(set(names)) < len(names):
+            raise ModelError(f"problem {name!r} puts a variable into two sets: {names}; intersect them or rename one")
+        used = {variable.name for term in objective.terms for variable in term.variables}
+        used |= {variable.name for variable, _ in self.constraints.values()}
+        if missing := sorted(used - set(names)):
+            raise ModelError(f"problem {name!r} uses {missing} but puts them in no set; add `{missing[0]} @ Free()`")
+
+    @property
+    def variables(self) -> tuple[Variable, ...]:
+        """The variables, in the order of the memberships."""
+        return tuple(membership.variable for membership in self.memberships)
+
+    @property
+    def curvature(self) -> Curvature:
+        """Curvature of the function to be minimized, from the declared curvature of its terms."""
+        sign = 1.0 if self.objective.sense is Sense.MINIMIZE else -1.0
+        kinds = {(term * sign).curvature for term in self.objective.terms} - {Curvature.AFFINE}
+        if not kinds:
+            return Curvature.AFFINE
+        return kinds.pop() if len(kinds) == 1 else Curvature.UNKNOWN
+
+    def fix(self, **values: FloatArray) -> Problem:
+        """Return the problem in the other variables, with the named ones constant.
+
+        Raises `ModelError` if a name is not a variable, or none would be left.
+        """
+        known = {variable.name for variable in self.variables}
+        if unknown := sorted(set(values) - known):
+            raise ModelError(f"problem {self.name!r} has no variable {unknown[0]!r}; it has {sorted(known)}")
+        if not known - set(values):
+            raise ModelError(f"problem {self.name!r}: fixing every variable leaves nothing to solve")
+        terms = [term.fix(values) for term in self.objective.terms]
+        constant = self.objective.constant
+        constant += sum(term.value_and_gradient(values)[0] for term in self.objective.terms if _within(term, values))
+        free = tuple(term for term in terms if term.variables)
+        memberships = tuple(member for member in self.memberships if member.variable.name not in values)
+        constraints = {key: item for key, item in self.constraints.items() if item[0].name not in values}
+        objective = replace(self.objective, terms=free, constant=constant)
+        return Problem(self.name, objective, *memberships, constraints=constraints)
+
+    def latex(self) -> str:
+        """Return the problem as one display of LaTeX."""
+        verb = "max" if self.objective.sense is Sense.MAXIMIZE else "min"
+        names = ", ".join(variable.name for variable in self.variables)
+        formula = " + ".join(term.latex() for term in self.objective.terms)
+        sets = [member.set.latex(member.variable.name) for member in self.memberships]
+        limits = r",\ ".join([text for text in sets if text] + [rf"\text{{{name}}}" for name in self.constraints])
+        return rf"\{verb}_{{{names}}}\; {formula}" + (rf" \quad\text{{s.t.}}\quad {limits}" if limits else "")
+
+    def __str__(self) -> str:
+        formula = " + ".join(str(term) for term in self.objective.terms)
+        sets = ", ".join(str(member) for member in self.memberships)
+        shapes = ", ".join(f"{variable.name} of shape {variable.shape}" for variable in self.variables)
+        named = "".join(f"\n  and {name}" for name in self.constraints)
+        return f"{self.name}: {self.objective.sense.value} {formula}\n  subject to {sets}{named}\n  with {shapes}"
+
+
+def _within(term: Applied, values: Mapping[str, FloatArray]) -> bool:
+    return all(variable.name in values for variable in term.variables)
