@@ -1,0 +1,76 @@
+"""From a surface to the nonnegative orthant by scaling, for solvers that know bounds only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nonrigid.formulations.model import Applied, Membership, Objective, Problem, nonnegative
+from nonrigid.geometry.arrays import FloatArray
+from nonrigid.solvers.acceptance import Claim, Rewritten
+from nonrigid.solvers.judge import Values, restore
+
+
+@dataclass(frozen=True, eq=False)
+class OnRays:
+    """Evaluate a term at y / gauge(y): constant along rays, so that bounds y >= 0 suffice."""
+
+    term: Any
+    surface: Any
+
+    def value_and_gradient(self, *y: FloatArray) -> tuple[float, FloatArray]:
+        """Return f(y / g) and its gradient (f' - (f'x) g') / g, with g the gauge of y and x = y / g."""
+        gauge, normal = self.surface.gauge_and_gradient(y[0])
+        if gauge <= 0.0:
+            return float("nan"), np.full_like(y[0], np.nan)
+        x = y[0] / gauge
+        value, gradient = self.term.value_and_gradient(x)
+        return value, (gradient - float(gradient @ x) * normal) / gauge
+
+
+@dataclass(frozen=True)
+class Radial:
+    """Replace u on a surface {x >= 0, gauge(x) = 1} by y >= 0 with u = y / gauge(y).
+
+    Exact: every ray meets the surface once. The objective is flat along rays, which suits quasi-Newton methods and
+    misleads interior-point ones.
+    """
+
+    name: str = "radial"
+    claim: Claim = Claim.EXACT
+
+    def obstacle(self, problem: Problem) -> str | None:
+        """Return why rays cannot stand for points."""
+        if problem.constraints:
+            return f"no named constraints, and {sorted(problem.constraints)} stand in the problem"
+        if not any(hasattr(member.set, "gauge_and_gradient") for member in problem.memberships):
+            return "a variable on a simplex, elastic net or sphere"
+        surfaces = {m.variable.name for m in problem.memberships if hasattr(m.set, "gauge_and_gradient")}
+        for applied in problem.objective.terms:
+            if len(applied.variables) > 1 and any(variable.name in surfaces for variable in applied.variables):
+                return f"terms of one variable, and {applied} has {len(applied.variables)}"
+        return None
+
+    def apply(self, problem: Problem) -> Rewritten:
+        """Return the problem over rays."""
+        sets: dict[str, Any] = {member.variable.name: member.set for member in problem.memberships}
+        terms = tuple(_on_rays(applied, sets) for applied in problem.objective.terms)
+        memberships = tuple(
+            Membership(m.variable, nonnegative() if hasattr(m.set, "gauge_and_gradient") else m.set)
+            for m in problem.memberships
+        )
+        objective = Objective(problem.objective.sense, terms, problem.objective.constant)
+
+        def inverse(values: Values) -> Values:
+            return restore(problem, values)
+
+        return Rewritten(Problem(problem.name, objective, *memberships), lambda values: values, inverse)
+
+
+def _on_rays(applied: Applied, sets: dict[str, Any]) -> Applied:
+    surface = sets[applied.variables[0].name]
+    if not hasattr(surface, "gauge_and_gradient"):
+        return applied
+    return Applied(OnRays(applied.term, surface), applied.variables, applied.weight)

@@ -1,0 +1,121 @@
+"""A solve in a child process that can be killed: the only hard time limit, and the only shield against a crash."""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from dataclasses import replace
+from multiprocessing.connection import Connection
+from typing import Any
+
+import numpy as np
+
+from nonrigid.formulations.model import Problem
+from nonrigid.geometry.arrays import FloatArray
+from nonrigid.solvers.backend import Backend
+from nonrigid.solvers.judge import Values, judge
+from nonrigid.solvers.layout import Layout
+from nonrigid.solvers.limits import Limits
+from nonrigid.solvers.once import solve_once
+from nonrigid.solvers.solution import Solution, TracePoint
+from nonrigid.solvers.status import Status
+
+_REPORT_EVERY = 0.1  # seconds between the points that the child hands over while it works
+
+
+def run_isolated(problem: Problem, backend: Backend, start: Values, limits: Limits) -> Solution:
+    """Solve in a child process, kill it at `limits.hard_seconds`, and keep the best point it had handed over.
+
+    A crash of a native library ends as `backend_error` with the signal's number.
+    """
+    assert limits.hard_seconds is not None
+    context: Any = multiprocessing.get_context(_start_method())
+    here, there = context.Pipe(duplex=False)
+    child = context.Process(target=_work, args=(there, problem, backend, start, limits), daemon=True)
+    begun = time.perf_counter()
+    child.start()
+    there.close()
+    answer, best, trace = _listen(here, begun + limits.hard_seconds)
+    seconds = time.perf_counter() - begun
+    alive = child.is_alive() and answer is None
+    if alive:
+        child.kill()
+    child.join()
+    here.close()
+    if answer is not None:
+        return answer
+    if alive:
+        status, words = Status.LIMIT, f"killed after {limits.hard_seconds:g} s"
+    else:
+        status, words = Status.BACKEND_ERROR, f"the child process ended with exit code {child.exitcode}"
+    return _salvaged(problem, backend, status, words, best, trace, seconds)
+
+
+def _start_method() -> str:
+    # Forking hands the problem's matrices over without copying them; platforms that cannot fork pickle them.
+    return "fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn"
+
+
+def _work(pipe: Connection, problem: Problem, backend: Backend, start: Values, limits: Limits) -> None:
+    sent = [0.0]
+
+    def report(point: FloatArray, trace: TracePoint) -> None:
+        now = time.perf_counter()
+        if now - sent[0] >= _REPORT_EVERY:
+            sent[0] = now
+            pipe.send((point, trace))
+
+    pipe.send(solve_once(problem, backend, start, limits, report))
+    pipe.close()
+
+
+def _listen(pipe: Connection, deadline: float) -> tuple[Solution | None, FloatArray | None, list[TracePoint]]:
+    best: FloatArray | None = None
+    trace: list[TracePoint] = []
+    while (left := deadline - time.perf_counter()) > 0:
+        if not pipe.poll(left):
+            break
+        try:
+            message = pipe.recv()
+        except EOFError:
+            break
+        if isinstance(message, Solution):
+            return message, best, trace
+        best, point = message
+        trace.append(point)
+    return None, best, trace
+
+
+def _salvaged(
+    problem: Problem,
+    backend: Backend,
+    status: Status,
+    words: str,
+    best: FloatArray | None,
+    trace: list[TracePoint],
+    seconds: float,
+) -> Solution:
+    solution = Solution(
+        problem=problem.name,
+        sense=problem.objective.sense,
+        backend=backend.name,
+        algorithm=backend.algorithm,
+        status=status,
+        message=f"{words}; {status.advice}",
+        solve_seconds=seconds,
+        evaluations=trace[-1].evaluations if trace else float("nan"),
+        trace=tuple(trace),
+        route=(f"{backend.name}:{backend.algorithm}",),
+        raw_status=words,
+        versions=backend.versions(),
+    )
+    if best is None or not np.isfinite(best).all():
+        return solution
+    judged = judge(problem, Layout(problem).split(best))
+    return replace(
+        solution,
+        values=judged.values,
+        objective=judged.objective,
+        violation=judged.violation,
+        stationarity=judged.stationarity,
+    )

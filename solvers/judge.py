@@ -1,0 +1,93 @@
+"""The package's own measurement of a point: restored exactly onto its sets, then judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from nonrigid.formulations.model import Problem, Sense
+from nonrigid.geometry.arrays import FloatArray
+from nonrigid.solvers.layout import Layout
+
+Values = Mapping[str, FloatArray]
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """Hold a restored point with its objective (user's sense), violation and stationarity."""
+
+    values: dict[str, FloatArray]
+    objective: float
+    violation: float
+    stationarity: float
+
+
+def restore(problem: Problem, values: Values) -> dict[str, FloatArray]:
+    """Return the values, each brought exactly onto its set."""
+    return {m.variable.name: m.set.restore(np.asarray(values[m.variable.name], float)) for m in problem.memberships}
+
+
+def violation(problem: Problem, values: Values) -> float:
+    """Return the largest violation of a set or named constraint."""
+    sets = [member.set.violation(values[member.variable.name]) for member in problem.memberships]
+    named = [condition.violation(values[variable.name]) for variable, condition in problem.constraints.values()]
+    return max(sets + named)
+
+
+def judge(problem: Problem, values: Values) -> Judgement:
+    """Restore a point and measure it.
+
+    Stationarity is, per variable and summed: where the set (or its convex body) has a closed-form linear maximiser, the
+    Frank-Wolfe gap max_s g'(s - x) with g the gradient of the function maximized, in units of the objective; where the
+    set has only a projection, the largest entry of |P(x + g) - x|; where named constraints stand in the problem, the
+    largest entry of a KKT residual with multipliers by least squares (an upper bound of the smallest one).
+    """
+    point = restore(problem, values)
+    objective, gradient = problem.objective.value_and_gradient(point)
+    sign = 1.0 if problem.objective.sense is Sense.MAXIMIZE else -1.0
+    if problem.constraints or not all(_closed_form(member.set) for member in problem.memberships):
+        residual = _kkt_residual(problem, point, {name: -sign * part for name, part in gradient.items()})
+    else:
+        residual = sum(
+            _set_residual(m.set, point[m.variable.name], sign * gradient[m.variable.name]) for m in problem.memberships
+        )
+    return Judgement(point, objective, violation(problem, point), residual)
+
+
+def _closed_form(set_: Any) -> bool:
+    return hasattr(set_, "linear_max") or hasattr(set_, "project")
+
+
+def _set_residual(set_: Any, x: FloatArray, ascent: FloatArray) -> float:
+    if hasattr(set_, "linear_max"):
+        best = set_.linear_max(ascent)
+        return max(float(np.sum(ascent * best) - np.sum(ascent * x)), 0.0)
+    return float(np.max(np.abs(set_.project(x + ascent) - x), initial=0.0))
+
+
+def _kkt_residual(problem: Problem, point: Values, gradient: Values) -> float:
+    layout = Layout(problem)
+    x, g = layout.join(point), layout.join(gradient)
+    lower, upper = layout.bounds()
+    near = 1e-8 * np.maximum(1.0, np.abs(x))
+    at_lower, at_upper = x - lower <= near, upper - x <= near
+    rows, signed = [], []
+    for item in layout.constraints():
+        value, jacobian = item.value_and_jacobian(x)
+        active = np.ones(len(value), bool) if item.constraint.kind == "equal" else value >= -1e-8
+        rows.append(jacobian[active])
+        signed.append(np.full(int(active.sum()), item.constraint.kind == "at most"))
+    A = np.vstack(rows) if rows else np.zeros((0, len(x)))
+    one_sided = np.concatenate(signed) if signed else np.zeros(0, bool)
+    inner = ~(at_lower | at_upper)
+    multipliers = (
+        np.linalg.lstsq(A[:, inner].T, -g[inner], rcond=None)[0] if len(A) and inner.any() else np.zeros(len(A))
+    )
+    multipliers = np.where(one_sided, np.maximum(multipliers, 0.0), multipliers)
+    slope = g + A.T @ multipliers
+    slope = np.where(at_lower, np.minimum(slope, 0.0), slope)
+    slope = np.where(at_upper, np.maximum(slope, 0.0), slope)
+    return float(np.max(np.abs(np.where(at_lower & at_upper, 0.0, slope)), initial=0.0))

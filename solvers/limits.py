@@ -1,0 +1,50 @@
+"""How long a solve may take, and how exact it should be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nonrigid.geometry.errors import InputError
+
+
+@dataclass(frozen=True, kw_only=True)
+class Limits:
+    """Bound a solve.
+
+    Parameters
+    ----------
+    evaluations
+        Largest number of evaluations of objective and gradient; None for no bound. A column of a constant Hessian of n
+        columns counts 1/n.
+    seconds
+        Wall-clock time of the solver, kept between evaluations: a long evaluation or a library's own inner work can
+        exceed it. The package's own measurements are not counted. None for no bound.
+    hard_seconds
+        Wall-clock time after which the solve is killed: it then runs in a child process, and the best point that had
+        been reported is kept. None (default) runs in this process.
+    tolerance
+        Stationarity, relative to max(1, |objective|), at which a point counts as stationary; backends are asked to go
+        a little beyond it.
+    feasibility
+        Largest violation at which a point counts as lying in its sets.
+
+    Examples
+    --------
+    >>> Limits(seconds=5).tolerance
+    1e-06
+    """
+
+    evaluations: int | None = None
+    seconds: float | None = 60.0
+    hard_seconds: float | None = None
+    tolerance: float = 1e-6
+    feasibility: float = 1e-7
+
+    def __post_init__(self) -> None:
+        for name in ("evaluations", "seconds", "hard_seconds"):
+            value = getattr(self, name)
+            if value is not None and not value > 0:
+                raise InputError(f"{name} is {value}", remedy="give a positive number, or None for no limit")
+        for name in ("tolerance", "feasibility"):
+            if not getattr(self, name) > 0:
+                raise InputError(f"{name} is {getattr(self, name)}", remedy="give a small positive number")

@@ -1,0 +1,149 @@
+"""One backend, one start: hand the problem over, survive what happens, measure what came back."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from nonrigid.formulations.model import Problem, Sense
+from nonrigid.geometry.arrays import FloatArray
+from nonrigid.solvers.acceptance import Claim, Refused, Rewritten, Via
+from nonrigid.solvers.backend import Backend, Raw
+from nonrigid.solvers.judge import Judgement, Values, judge
+from nonrigid.solvers.limits import Limits
+from nonrigid.solvers.oracle import LimitReached, NotFiniteError, Oracle
+from nonrigid.solvers.solution import Solution, TracePoint
+from nonrigid.solvers.status import Status
+
+Report = Callable[[FloatArray, TracePoint], None]
+
+
+def solve_once(
+    problem: Problem, backend: Backend, start: Values, limits: Limits, report: Report | None = None
+) -> Solution:
+    """Solve from one start in this process; see `nonrigid.solvers.solve.solve`."""
+    begun = time.perf_counter()
+    accepted = backend.accepts(problem)
+    head = _Head(problem, backend)
+    if isinstance(accepted, Refused):
+        return head.solution(Status.REFUSED, accepted.reason)
+    bridges = accepted.bridges if isinstance(accepted, Via) else ()
+    rewritten = _rewrite(problem, bridges)
+    oracle = Oracle(
+        rewritten.problem,
+        limits,
+        original=problem,
+        inverse=rewritten.inverse if bridges else None,
+        report=report,
+    )
+    flat = oracle.layout.join(rewritten.forward(start))
+    before = time.perf_counter() - begun
+    raw, failure = _run(backend, oracle, flat, limits)
+    seconds, evaluations = oracle.seconds, oracle.evaluations
+    judged = _measured(problem, rewritten, oracle, raw)
+    status, message = _decide(judged, limits, oracle, failure)
+    claims = [bridge.claim for bridge in bridges if bridge.claim is not Claim.EXACT]
+    return head.solution(
+        status,
+        message,
+        values={} if judged is None else judged.values,
+        objective=float("nan") if judged is None else judged.objective,
+        violation=float("nan") if judged is None else judged.violation,
+        stationarity=float("nan") if judged is None else judged.stationarity,
+        build_seconds=before + oracle.build_seconds,
+        solve_seconds=seconds,
+        evaluations=evaluations,
+        trace=tuple(oracle.trace),
+        route=(*(bridge.name for bridge in bridges), f"{backend.name}:{backend.algorithm}"),
+        claim=(claims[0] if claims else Claim.EXACT).value,
+        raw_status=raw.raw_status if failure is None else f"{type(failure).__name__}: {failure}",
+        versions=backend.versions(),
+    )
+
+
+class _Head:
+    """Hold what every solution of one attempt has in common."""
+
+    def __init__(self, problem: Problem, backend: Backend) -> None:
+        self.problem, self.backend = problem, backend
+
+    def solution(self, status: Status, message: str, **measured: object) -> Solution:
+        return Solution(
+            problem=self.problem.name,
+            sense=self.problem.objective.sense,
+            backend=self.backend.name,
+            algorithm=self.backend.algorithm,
+            status=status,
+            message=message,
+            **measured,  # type: ignore[arg-type]
+        )
+
+
+def _rewrite(problem: Problem, bridges: tuple[object, ...]) -> Rewritten:
+    steps = []
+    current = problem
+    for bridge in bridges:
+        step: Rewritten = bridge.apply(current)  # type: ignore[attr-defined]
+        steps.append(step)
+        current = step.problem
+
+    def forward(values: Values) -> Values:
+        for step in steps:
+            values = step.forward(values)
+        return values
+
+    def inverse(values: Values) -> Values:
+        for step in reversed(steps):
+            values = step.inverse(values)
+        return values
+
+    return Rewritten(current, forward, inverse)
+
+
+def _run(backend: Backend, oracle: Oracle, start: FloatArray, limits: Limits) -> tuple[Raw, Exception | None]:
+    oracle.begin()
+    try:
+        return backend.run(oracle, start, limits), None
+    except (LimitReached, NotFiniteError):
+        return Raw(None, "stopped from inside an evaluation"), None
+    except Exception as failure:  # any library may raise anything: the attempt fails, not the caller
+        return Raw(None, ""), failure
+
+
+def _measured(problem: Problem, rewritten: Rewritten, oracle: Oracle, raw: Raw) -> Judgement | None:
+    """Judge the last point and the best one seen, and return the better; None if there is neither."""
+    found = [] if oracle.best is None else [judge(problem, oracle.best)]
+    if raw.x is not None and np.isfinite(raw.x).all():
+        found.append(judge(problem, rewritten.inverse(oracle.layout.split(np.asarray(raw.x, dtype=float)))))
+    finite = [judged for judged in found if np.isfinite(judged.objective)]
+    if not finite:
+        return None
+    sign = 1.0 if problem.objective.sense is Sense.MINIMIZE else -1.0
+    # The last point is preferred to an equally good one seen on the way: it is the more stationary of the two.
+    last = finite[-1]
+    margin = 1e-9 * max(1.0, abs(last.objective))
+    better = [j for j in finite if (j.violation, sign * j.objective) < (last.violation, sign * last.objective - margin)]
+    return better[0] if better and better[0].violation <= oracle.limits.feasibility else last
+
+
+def _decide(judged: Judgement | None, limits: Limits, oracle: Oracle, failure: Exception | None) -> tuple[Status, str]:
+    stop = oracle.interrupted
+    if judged is None:
+        if isinstance(stop, NotFiniteError):
+            return Status.NUMERICAL_ERROR, f"{stop}; {Status.NUMERICAL_ERROR.advice}"
+        if isinstance(stop, LimitReached):
+            return Status.LIMIT, f"{stop} before the first point; {Status.LIMIT.advice}"
+        return Status.BACKEND_ERROR, f"no point was returned; {Status.BACKEND_ERROR.advice}"
+    if judged.violation > limits.feasibility:
+        return Status.INFEASIBLE, f"violation {judged.violation:.2g}; {Status.INFEASIBLE.advice}"
+    if judged.stationarity <= limits.tolerance * max(1.0, abs(judged.objective)):
+        return Status.STATIONARY, Status.STATIONARY.advice
+    if isinstance(stop, NotFiniteError):
+        return Status.NUMERICAL_ERROR, f"{stop}; {Status.NUMERICAL_ERROR.advice}"
+    if isinstance(stop, LimitReached):
+        return Status.LIMIT, f"{stop}; {Status.LIMIT.advice}"
+    if failure is not None:
+        return Status.BACKEND_ERROR, f"{failure or type(failure).__name__}; {Status.BACKEND_ERROR.advice}"
+    return Status.FEASIBLE, f"stationarity {judged.stationarity:.2g}; {Status.FEASIBLE.advice}"
