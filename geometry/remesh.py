@@ -1,0 +1,57 @@
+"""Make triangle meshes: of an implicit surface, or of another mesh with fewer vertices; and find points on them."""
+
+from __future__ import annotations
+
+import igl
+import numpy as np
+
+from nonrigid.geometry.arrays import FloatArray
+from nonrigid.geometry.errors import InputError
+from nonrigid.geometry.mesh import Mesh
+from nonrigid.geometry.points import SurfacePoints
+
+
+def closest_points(mesh: Mesh, positions: FloatArray) -> SurfacePoints:
+    """Return the (p,) points of the surface closest to (p, 3) positions in space.
+
+    Examples
+    --------
+    >>> triangle = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    >>> closest_points(triangle, np.array([[0.5, 0.25, 9.0]])).barycentric
+    array([[0.25, 0.5 , 0.25]])
+    """
+    place = np.ascontiguousarray(positions, dtype=np.float64)
+    _, face, closest = igl.point_mesh_squared_distance(place, mesh.vertices, mesh.faces)
+    corners = [np.ascontiguousarray(mesh.vertices[mesh.faces[face, c]]) for c in range(3)]
+    weights = np.asarray(igl.barycentric_coordinates(np.ascontiguousarray(closest), *corners))
+    # A face without area has no barycentric coordinates: its nearest corner stands for it.
+    wrong = ~(np.abs(weights.sum(axis=1) - 1.0) < 1e-6) | (weights < -1e-3).any(axis=1)
+    if wrong.any():
+        gap = np.stack([np.linalg.norm(corner[wrong] - closest[wrong], axis=1) for corner in corners], axis=1)
+        weights[wrong] = np.eye(3)[gap.argmin(axis=1)]
+    weights = np.clip(weights, 0.0, None)
+    return SurfacePoints(face, weights / weights.sum(axis=1, keepdims=True))
+
+
+def decimate(mesh: Mesh, vertex_count: int) -> Mesh:
+    """Collapse edges by quadric error until about `vertex_count` vertices are left.
+
+    Boundary loops and manifoldness stay. The vertex count is met up to a few: a collapse at a boundary takes one face
+    less.
+
+    Raises
+    ------
+    InputError
+        If the mesh has fewer vertices than asked for, or fewer than four are asked for.
+
+    Source: Garland and Heckbert 1997, "Surface simplification using quadric error metrics".
+    """
+    if not 4 <= vertex_count <= len(mesh.vertices):
+        raise InputError(
+            f"{vertex_count} vertices asked of {mesh.name} with {len(mesh.vertices)}",
+            remedy="ask for fewer, at least 4",
+        )
+    # Each collapse takes one vertex and two faces.
+    face_count = len(mesh.faces) - 2 * (len(mesh.vertices) - vertex_count)
+    vertices, faces, _, _ = igl.qslim(np.asfortranarray(mesh.vertices), np.asfortranarray(mesh.faces), face_count)
+    return Mesh(np.ascontiguousarray(vertices), np.ascontiguousarray(faces), name=mesh.name)
