@@ -1,0 +1,139 @@
+"""SciPy's minimizers: the peers that a user would pick first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any, ClassVar
+
+import numpy as np
+import scipy.optimize
+
+from nonrigid.formulations.model import Problem
+from nonrigid.geometry.arrays import FloatArray
+from nonrigid.solvers.acceptance import Acceptance
+from nonrigid.solvers.backend import Raw
+from nonrigid.solvers.bridges.radial import Radial
+from nonrigid.solvers.capability import Capability, accept
+from nonrigid.solvers.layout import FlatConstraint
+from nonrigid.solvers.limits import Limits
+from nonrigid.solvers.oracle import NotFiniteError, Oracle
+
+_CAPABILITIES = {
+    "L-BFGS-B": Capability(),
+    "SLSQP": Capability(
+        equal=True,
+        at_most=True,
+        largest=1000,
+        because="SLSQP solves a dense least-squares problem of n^2 entries a step",
+    ),
+    "trust-constr": Capability(
+        equal=True, at_most=True, largest=1000, because="trust-constr factorises a system of all bounds in each step"
+    ),
+}
+_UNBOUNDED = 10**9  # SciPy's own limits on iterations are lifted: the oracle keeps the limits
+
+
+@dataclass(frozen=True)
+class Scipy:
+    """Solve problems by scipy.optimize.minimize.
+
+    Parameters
+    ----------
+    algorithm
+        "L-BFGS-B" (bounds only; surfaces by rays), "SLSQP" or "trust-constr" (with products of the Hessian where every
+        term offers them).
+
+    Examples
+    --------
+    >>> Scipy("SLSQP").name
+    'scipy'
+    """
+
+    algorithm: str = ""
+    name: ClassVar[str] = "scipy"
+    algorithms: ClassVar[tuple[str, ...]] = tuple(_CAPABILITIES)
+
+    @classmethod
+    def default_algorithm(cls, problem: Problem) -> str:
+        """Return L-BFGS-B, which scales best, or SLSQP where constraints remain."""
+        taken = accept(problem, "L-BFGS-B", _CAPABILITIES["L-BFGS-B"], [(), (Radial(),)])
+        return "SLSQP" if hasattr(taken, "reason") else "L-BFGS-B"
+
+    def accepts(self, problem: Problem) -> Acceptance:
+        """Take what the algorithm takes; surfaces by rays where it knows bounds only."""
+        return accept(problem, self.algorithm, _CAPABILITIES[self.algorithm], [(), (Radial(),)])
+
+    def run(self, oracle: Oracle, start: FloatArray, limits: Limits) -> Raw:
+        """Run the algorithm; a limit leaves it as an exception, and the oracle has kept the best point."""
+        arguments: dict[str, Any] = {"options": _options(self.algorithm, limits)}
+        if self.algorithm == "trust-constr":
+            arguments["constraints"] = [_nonlinear(item, oracle) for item in oracle.constraints]
+            if _second_order(oracle.problem):
+                arguments["hessp"] = oracle.hessian_product
+        elif self.algorithm == "SLSQP":
+            arguments["constraints"] = [_signed(item, oracle) for item in oracle.constraints]
+        oracle.built()
+        found = scipy.optimize.minimize(
+            oracle.value_and_gradient,
+            np.clip(start, oracle.lower, oracle.upper),
+            jac=True,
+            method=self.algorithm,
+            bounds=scipy.optimize.Bounds(oracle.lower, oracle.upper),
+            **arguments,
+        )
+        return Raw(np.asarray(found.x, float), f"{found.status}: {found.message}")
+
+    @classmethod
+    def versions(cls) -> dict[str, str]:
+        """Return the version of SciPy."""
+        return {"scipy": version("scipy")}
+
+
+def _options(algorithm: str, limits: Limits) -> dict[str, Any]:
+    tight = 0.1 * limits.tolerance
+    if algorithm == "L-BFGS-B":
+        return {"gtol": tight, "ftol": 0.0, "maxiter": _UNBOUNDED, "maxfun": _UNBOUNDED, "maxcor": 20}
+    if algorithm == "SLSQP":
+        return {"ftol": max(1e-3 * limits.tolerance**2, 1e-15), "maxiter": _UNBOUNDED}
+    return {"gtol": tight, "xtol": 1e-14, "barrier_tol": tight, "maxiter": _UNBOUNDED}
+
+
+def _second_order(problem: Problem) -> bool:
+    return all(
+        hasattr(applied.term, "hessian_product") and len(applied.variables) == 1 for applied in problem.objective.terms
+    )
+
+
+def _checked(item: FlatConstraint, oracle: Oracle) -> Callable[[FloatArray], tuple[FloatArray, FloatArray]]:
+    def evaluate(x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        oracle.charge(0.0)
+        value, jacobian = item.value_and_jacobian(np.array(x))
+        if not (np.isfinite(value).all() and np.isfinite(jacobian).all()):
+            oracle.interrupted = NotFiniteError(f"the constraint {item.name!r} is not finite at a point tried")
+            raise oracle.interrupted
+        return value, jacobian
+
+    return evaluate
+
+
+def _signed(item: FlatConstraint, oracle: Oracle) -> dict[str, Any]:
+    evaluate = _checked(item, oracle)
+    kind, sign = ("eq", 1.0) if item.constraint.kind == "equal" else ("ineq", -1.0)  # SciPy's inequality is c(x) >= 0
+    return {"type": kind, "fun": lambda x: sign * evaluate(x)[0], "jac": lambda x: sign * evaluate(x)[1]}
+
+
+def _nonlinear(item: FlatConstraint, oracle: Oracle) -> Any:
+    evaluate = _checked(item, oracle)
+    flat = np.zeros((oracle.size, oracle.size))
+    return scipy.optimize.NonlinearConstraint(
+        lambda x: evaluate(x)[0],
+        0.0 if item.constraint.kind == "equal" else -np.inf,
+        0.0,
+        jac=lambda x: evaluate(x)[1],
+        hess=(lambda x, v: flat) if item.constraint.linear else scipy.optimize.BFGS(),
+    )
+
+
+BACKEND = Scipy
