@@ -94,7 +94,7 @@ def score(pair: PairData, points: SurfacePoints, *, geodesics: str = "dijkstra")
     InputError
         If the pair has no ground truth, or `points` has not one row a vertex of the part, or a matched vertex has none.
 
-        If the pair has no ground truth, `points` has not one row a vertex of the part, or a matched vertex has none.
+    Source: Cosmo et al. 2016, "SHREC'16: Partial Matching of Deformable Shapes", section 4. Its text leaves open whether
     the better of the two sides is taken for a shape or for a point; both means are given.
     """
     if pair.truth is None:

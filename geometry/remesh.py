@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import igl
 import numpy as np
+from numpy.typing import ArrayLike
 
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.geometry.errors import InputError
@@ -31,6 +34,42 @@ def closest_points(mesh: Mesh, positions: FloatArray) -> SurfacePoints:
         weights[wrong] = np.eye(3)[gap.argmin(axis=1)]
     weights = np.clip(weights, 0.0, None)
     return SurfacePoints(face, weights / weights.sum(axis=1, keepdims=True))
+
+
+def isosurface(
+    field: Callable[[FloatArray], FloatArray], lower: ArrayLike, upper: ArrayLike, spacing: float, *, name: str = "mesh"
+) -> Mesh:
+    """Triangulate the zero set of a field by marching cubes on a regular grid.
+
+    Parameters
+    ----------
+    field
+        From (p, 3) positions to (p,) values, negative inside.
+    lower, upper
+        Two corners of a box; the surface is closed if it stays inside.
+    spacing
+        Edge length of the cubes, in the unit of the box.
+
+    Raises
+    ------
+    InputError
+        If the field has one sign on the whole grid.
+
+    Examples
+    --------
+    >>> ball = isosurface(lambda p: np.linalg.norm(p, axis=1) - 1.0, [-1.2] * 3, [1.2] * 3, 0.1)
+    >>> round(ball.area / (4 * np.pi), 2), len(ball.boundary_edges)
+    (1.0, 0)
+    """
+    low = np.asarray(lower, dtype=float)
+    size = np.ceil((np.asarray(upper, dtype=float) - low) / spacing).astype(int) + 1
+    ax, ay, az = (low[axis] + spacing * np.arange(size[axis]) for axis in range(3))
+    z, y, x = np.meshgrid(az, ay, ax, indexing="ij")
+    grid = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
+    vertices, faces, _ = igl.marching_cubes(field(grid), grid, *(int(count) for count in size), 0.0)
+    if not len(faces):
+        raise InputError("the field has one sign on the whole grid", remedy="give a box around the surface")
+    return Mesh(vertices, faces, name=name)
 
 
 def decimate(mesh: Mesh, vertex_count: int) -> Mesh:
