@@ -72,10 +72,10 @@ def wave_energies(spectrum: Spectrum, count: int) -> tuple[FloatArray, float]:
 
     Examples
     --------
-    >>> flat = Spectrum(eigenvalues=np.exp([0.0, 1.0, 29.0]), eigenfunctions=np.ones((1, 3)), mass=np.ones(1))
+    >>> flat = Spectrum(eigenvalues=np.exp([0.0, 1.0, 14.5]), eigenfunctions=np.ones((1, 3)), mass=np.ones(1))
     >>> energies, width = wave_energies(flat, 2)
     >>> energies.round(6), round(width, 6)
-    (array([14., 15.]), 7.0)
+    (array([7. , 7.5]), 3.5)
 
     Source: Aubry, Schlickewei, Cremers (2011), section 4.
     """
