@@ -52,11 +52,13 @@ class ExactGeodesics:
     def distances(self, sources: ArrayLike) -> FloatArray:
         """Return the (s, n) distances from `sources`, in the unit of the vertices; inf where there is no way."""
         numbers = checked_vertices(sources, len(self.mesh.vertices))
-        result = np.empty((len(numbers), len(self.mesh.vertices)))
-        for row, source in enumerate(numbers):
-            result[row] = self._solver.geodesicDistances(np.array([source]), None)[0]
         component = self.mesh.component_of_vertex
-        return np.where(component[numbers][:, None] == component, result, np.inf)
+        result = np.full((len(numbers), len(self.mesh.vertices)), np.inf)
+        for row, source in enumerate(numbers):
+            # Asked about a vertex it cannot reach, the solver reads memory that it never wrote.
+            reachable = np.flatnonzero(component == component[source])
+            result[row, reachable] = self._solver.geodesicDistances(np.array([source]), reachable)[0]
+        return result
 
     @cached_property
     def _solver(self) -> Any:
