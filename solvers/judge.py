@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from nonrigid.formulations.model import Problem, Sense
-from nonrigid.geometry.arrays import FloatArray
+from nonrigid.geometry.arrays import BoolArray, FloatArray
 from nonrigid.solvers.layout import Layout
 
 Values = Mapping[str, FloatArray]
@@ -34,7 +34,8 @@ def violation(problem: Problem, values: Values) -> float:
     """Return the largest violation of a set or named constraint."""
     sets = [member.set.violation(values[member.variable.name]) for member in problem.memberships]
     named = [condition.violation(values[variable.name]) for variable, condition in problem.constraints.values()]
-    return max(sets + named)
+    worst = float(np.max(sets + named))
+    return np.inf if np.isnan(worst) else worst
 
 
 def judge(problem: Problem, values: Values) -> Judgement:
@@ -48,8 +49,10 @@ def judge(problem: Problem, values: Values) -> Judgement:
     point = restore(problem, values)
     objective, gradient = problem.objective.value_and_gradient(point)
     sign = 1.0 if problem.objective.sense is Sense.MAXIMIZE else -1.0
+    if not all(np.isfinite(part).all() for part in gradient.values()):
+        return Judgement(point, objective, violation(problem, point), np.inf)
     if problem.constraints or not all(_closed_form(member.set) for member in problem.memberships):
-        residual = _kkt_residual(problem, point, {name: -sign * part for name, part in gradient.items()})
+        residual = kkt_residual(problem, point)
     else:
         residual = sum(
             _set_residual(m.set, point[m.variable.name], sign * gradient[m.variable.name]) for m in problem.memberships
@@ -68,9 +71,11 @@ def _set_residual(set_: Any, x: FloatArray, ascent: FloatArray) -> float:
     return float(np.max(np.abs(set_.project(x + ascent) - x), initial=0.0))
 
 
-def _kkt_residual(problem: Problem, point: Values, gradient: Values) -> float:
+def kkt_residual(problem: Problem, point: Values) -> float:
+    """Return the largest entry of a KKT residual, from bounds and constraints alone, multipliers by least squares."""
     layout = Layout(problem)
-    x, g = layout.join(point), layout.join(gradient)
+    sign = 1.0 if problem.objective.sense is Sense.MINIMIZE else -1.0
+    x, g = layout.join(point), sign * layout.join(problem.objective.value_and_gradient(point)[1])
     lower, upper = layout.bounds()
     near = 1e-8 * np.maximum(1.0, np.abs(x))
     at_lower, at_upper = x - lower <= near, upper - x <= near
@@ -82,12 +87,17 @@ def _kkt_residual(problem: Problem, point: Values, gradient: Values) -> float:
         signed.append(np.full(int(active.sum()), item.constraint.kind == "at most"))
     A = np.vstack(rows) if rows else np.zeros((0, len(x)))
     one_sided = np.concatenate(signed) if signed else np.zeros(0, bool)
-    inner = ~(at_lower | at_upper)
-    multipliers = (
-        np.linalg.lstsq(A[:, inner].T, -g[inner], rcond=None)[0] if len(A) and inner.any() else np.zeros(len(A))
-    )
-    multipliers = np.where(one_sided, np.maximum(multipliers, 0.0), multipliers)
-    slope = g + A.T @ multipliers
+    guesses = [np.zeros(len(A))]
+    # Entries at a bound say nothing of the multipliers, unless the bound is implied by a constraint (a vertex of the
+    # simplex, where an entry is 1): each choice of entries gives an upper bound of the residual, the least one is kept.
+    for told in (~(at_lower | at_upper), ~at_lower, ~at_upper) if len(A) else ():
+        if told.any():
+            found = np.linalg.lstsq(A[:, told].T, -g[told], rcond=None)[0]
+            guesses.append(np.where(one_sided, np.maximum(found, 0.0), found))
+    return min(_slope(g + A.T @ multipliers, at_lower, at_upper) for multipliers in guesses)
+
+
+def _slope(slope: FloatArray, at_lower: BoolArray, at_upper: BoolArray) -> float:
     slope = np.where(at_lower, np.minimum(slope, 0.0), slope)
     slope = np.where(at_upper, np.maximum(slope, 0.0), slope)
     return float(np.max(np.abs(np.where(at_lower & at_upper, 0.0, slope)), initial=0.0))
