@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import multiprocessing
 import time
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
 from typing import Any
-
-import numpy as np
 
 from nonrigid.formulations.model import Problem
 from nonrigid.geometry.arrays import FloatArray
@@ -35,20 +33,19 @@ def run_isolated(problem: Problem, backend: Backend, start: Values, limits: Limi
     begun = time.perf_counter()
     child.start()
     there.close()
-    answer, best, trace = _listen(here, begun + limits.hard_seconds)
+    heard = _listen(here, begun + limits.hard_seconds)
     seconds = time.perf_counter() - begun
-    alive = child.is_alive() and answer is None
-    if alive:
+    if heard.expired:
         child.kill()
     child.join()
     here.close()
-    if answer is not None:
-        return answer
-    if alive:
+    if heard.answer is not None:
+        return heard.answer
+    if heard.expired:
         status, words = Status.LIMIT, f"killed after {limits.hard_seconds:g} s"
     else:
         status, words = Status.BACKEND_ERROR, f"the child process ended with exit code {child.exitcode}"
-    return _salvaged(problem, backend, status, words, best, trace, seconds)
+    return _salvaged(problem, backend, status, words, heard, seconds)
 
 
 def _start_method() -> str:
@@ -69,21 +66,31 @@ def _work(pipe: Connection, problem: Problem, backend: Backend, start: Values, l
     pipe.close()
 
 
-def _listen(pipe: Connection, deadline: float) -> tuple[Solution | None, FloatArray | None, list[TracePoint]]:
+@dataclass
+class _Heard:
+    """Hold what a child handed over, and whether its time ran out before it said the last word or died."""
+
+    answer: Solution | None = None
     best: FloatArray | None = None
-    trace: list[TracePoint] = []
-    while (left := deadline - time.perf_counter()) > 0:
-        if not pipe.poll(left):
-            break
+    trace: list[TracePoint] = field(default_factory=list)
+    expired: bool = False
+
+
+def _listen(pipe: Connection, deadline: float) -> _Heard:
+    # A dead child shows as a closed pipe, possibly in mid-message; it may not yet show as a dead process.
+    heard = _Heard()
+    while (left := deadline - time.perf_counter()) > 0 and pipe.poll(left):
         try:
             message = pipe.recv()
-        except EOFError:
-            break
+        except (EOFError, OSError):
+            return heard
         if isinstance(message, Solution):
-            return message, best, trace
-        best, point = message
-        trace.append(point)
-    return None, best, trace
+            heard.answer = message
+            return heard
+        heard.best, point = message
+        heard.trace.append(point)
+    heard.expired = True
+    return heard
 
 
 def _salvaged(
@@ -91,10 +98,10 @@ def _salvaged(
     backend: Backend,
     status: Status,
     words: str,
-    best: FloatArray | None,
-    trace: list[TracePoint],
+    heard: _Heard,
     seconds: float,
 ) -> Solution:
+    best, trace = heard.best, heard.trace
     solution = Solution(
         problem=problem.name,
         sense=problem.objective.sense,
@@ -109,7 +116,7 @@ def _salvaged(
         raw_status=words,
         versions=backend.versions(),
     )
-    if best is None or not np.isfinite(best).all():
+    if best is None:
         return solution
     judged = judge(problem, Layout(problem).split(best))
     return replace(
