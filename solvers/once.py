@@ -42,7 +42,11 @@ def solve_once(
     before = time.perf_counter() - begun
     raw, failure = _run(backend, oracle, flat, limits)
     seconds, evaluations = oracle.seconds, oracle.evaluations
-    judged = _measured(problem, rewritten, oracle, raw)
+    try:
+        judged = _measured(problem, rewritten, oracle, raw)
+    except Exception as error:  # a term may fail at the last point where it had not at those before
+        judged, failure = None if oracle.best is None else judge(problem, oracle.best), failure or error
+    failure = failure or oracle.failure
     status, message = _decide(judged, limits, oracle, failure)
     claims = [bridge.claim for bridge in bridges if bridge.claim is not Claim.EXACT]
     return head.solution(
@@ -58,7 +62,7 @@ def solve_once(
         trace=tuple(oracle.trace),
         route=(*(bridge.name for bridge in bridges), f"{backend.name}:{backend.algorithm}"),
         claim=(claims[0] if claims else Claim.EXACT).value,
-        raw_status=raw.raw_status if failure is None else f"{type(failure).__name__}: {failure}",
+        raw_status=raw.raw_status if failure is None else _words(failure),
         versions=backend.versions(),
     )
 
@@ -115,17 +119,25 @@ def _run(backend: Backend, oracle: Oracle, start: FloatArray, limits: Limits) ->
 def _measured(problem: Problem, rewritten: Rewritten, oracle: Oracle, raw: Raw) -> Judgement | None:
     """Judge the last point and the best one seen, and return the better; None if there is neither."""
     found = [] if oracle.best is None else [judge(problem, oracle.best)]
-    if raw.x is not None and np.isfinite(raw.x).all():
-        found.append(judge(problem, rewritten.inverse(oracle.layout.split(np.asarray(raw.x, dtype=float)))))
+    if raw.x is not None:
+        last = np.asarray(raw.x, dtype=float)
+        if last.shape != (oracle.size,):
+            raise ValueError(f"the backend returned a point of shape {last.shape}, not {(oracle.size,)}")
+        if np.isfinite(last).all():
+            found.append(judge(problem, rewritten.inverse(oracle.layout.split(last))))
+        if not found or not np.isfinite(found[-1].objective):
+            oracle.interrupted = oracle.interrupted or NotFiniteError("the point returned, or its objective, is NaN")
     finite = [judged for judged in found if np.isfinite(judged.objective)]
     if not finite:
         return None
     sign = 1.0 if problem.objective.sense is Sense.MINIMIZE else -1.0
     # The last point is preferred to an equally good one seen on the way: it is the more stationary of the two.
-    last = finite[-1]
-    margin = 1e-9 * max(1.0, abs(last.objective))
-    better = [j for j in finite if (j.violation, sign * j.objective) < (last.violation, sign * last.objective - margin)]
-    return better[0] if better and better[0].violation <= oracle.limits.feasibility else last
+    final, first, allowed = finite[-1], finite[0], oracle.limits.feasibility
+    margin = 1e-9 * max(1.0, abs(final.objective))
+    if first.violation <= allowed:
+        worse = final.violation > allowed or sign * first.objective < sign * final.objective - margin
+        return first if worse else final
+    return final
 
 
 def _decide(judged: Judgement | None, limits: Limits, oracle: Oracle, failure: Exception | None) -> tuple[Status, str]:
@@ -135,7 +147,8 @@ def _decide(judged: Judgement | None, limits: Limits, oracle: Oracle, failure: E
             return Status.NUMERICAL_ERROR, f"{stop}; {Status.NUMERICAL_ERROR.advice}"
         if isinstance(stop, LimitReached):
             return Status.LIMIT, f"{stop} before the first point; {Status.LIMIT.advice}"
-        return Status.BACKEND_ERROR, f"no point was returned; {Status.BACKEND_ERROR.advice}"
+        words = "no point was returned" if failure is None else _words(failure)
+        return Status.BACKEND_ERROR, f"{words}; {Status.BACKEND_ERROR.advice}"
     if judged.violation > limits.feasibility:
         return Status.INFEASIBLE, f"violation {judged.violation:.2g}; {Status.INFEASIBLE.advice}"
     if judged.stationarity <= limits.tolerance * max(1.0, abs(judged.objective)):
@@ -145,5 +158,9 @@ def _decide(judged: Judgement | None, limits: Limits, oracle: Oracle, failure: E
     if isinstance(stop, LimitReached):
         return Status.LIMIT, f"{stop}; {Status.LIMIT.advice}"
     if failure is not None:
-        return Status.BACKEND_ERROR, f"{failure or type(failure).__name__}; {Status.BACKEND_ERROR.advice}"
+        return Status.BACKEND_ERROR, f"{_words(failure)}; {Status.BACKEND_ERROR.advice}"
     return Status.FEASIBLE, f"stationarity {judged.stationarity:.2g}; {Status.FEASIBLE.advice}"
+
+
+def _words(failure: Exception) -> str:
+    return f"{type(failure).__name__}: {failure}"

@@ -66,6 +66,7 @@ class Oracle:
         self.best_objective = np.nan
         self.build_seconds = 0.0
         self.interrupted: LimitReached | NotFiniteError | None = None
+        self.failure: Exception | None = None
         self._sign = 1.0 if problem.objective.sense is Sense.MINIMIZE else -1.0
         self._inverse = inverse
         self._report = report
@@ -98,8 +99,13 @@ class Oracle:
         self.charge(1.0)
         point = np.array(x, dtype=float)
         values = self.layout.split(point)
-        value, gradient = self.problem.objective.value_and_gradient(values)
-        flat = self.layout.join(gradient)
+        try:
+            value, gradient = self.problem.objective.value_and_gradient(values)
+            flat = self.layout.join(gradient)
+        except Exception as failure:
+            # A term failed, not the library; it may swallow this, so it is kept where `solve` sees it.
+            self.failure = failure
+            raise
         if not (np.isfinite(value) and np.isfinite(flat).all()):
             self._interrupt(NotFiniteError(f"the objective is {value}, or its gradient not finite, at a point tried"))
         self.observe(point, objective=value)
@@ -154,12 +160,13 @@ class Oracle:
             objective = self.original.objective.value(values)
             off = violation(self.original, values)
         better = self.best is None or self._sign * objective < self._sign * self.best_objective
-        if better and np.isfinite(objective) and off <= self.limits.feasibility:
+        kept = better and bool(np.isfinite(objective)) and off <= self.limits.feasibility
+        if kept:
             self.best, self.best_objective = {name: value.copy() for name, value in values.items()}, objective
         if better or self.evaluations >= self._next_trace:
             point = TracePoint(seconds, self.evaluations, objective, off)
             self._add(point)
-            if better and self._report is not None:
+            if kept and self._report is not None:
                 self._report(Layout(self.original).join(values), point)
         self._paused += time.perf_counter() - begun
 
