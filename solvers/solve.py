@@ -51,7 +51,7 @@ def solve(
     UnknownNameError
         If a backend or algorithm does not exist. A backend that cannot take the problem gives a refused `Solution`.
     InputError
-        If a start has the wrong names or shapes.
+        If a start has the wrong names or shapes, or entries that are not finite.
 
     Examples
     --------
@@ -94,6 +94,9 @@ def _starts(problem: Problem, start: Values | Solution | None, count: int, seed:
         if {name: np.shape(value) for name, value in given.items()} != shapes:
             shown = {name: np.shape(value) for name, value in given.items()}
             raise InputError(f"the start has shapes {shown}", remedy=f"the problem's variables have {shapes}")
+        for name, value in given.items():
+            if wrong := int(np.sum(~np.isfinite(value))):
+                raise InputError(f"the start has {wrong} entries of {name!r} that are not finite", remedy="repair them")
         first = given
     rng = np.random.default_rng(seed)
     others: list[Values] = [
@@ -105,7 +108,7 @@ def _starts(problem: Problem, start: Values | Solution | None, count: int, seed:
 def _merit(answer: Solution) -> tuple[bool, float]:
     sign = 1.0 if answer.sense is Sense.MAXIMIZE else -1.0
     worth = sign * answer.objective
-    return answer.status.usable, worth if np.isfinite(worth) else -np.inf
+    return answer.status.usable and bool(answer.values), worth if np.isfinite(worth) else -np.inf
 
 
 def _as_attempt(answer: Solution) -> Attempt:
