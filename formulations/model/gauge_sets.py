@@ -93,9 +93,10 @@ class ElasticNet:
         linear, positive = 1.0 - self.mix, np.sort(g[g > 0.0])[::-1]
         count = np.arange(1, len(positive) + 1)
         multiplier = np.sqrt(np.cumsum(positive**2) / (4.0 * self.mix + count * linear**2))
-        support = int(np.flatnonzero(positive > multiplier * linear)[-1])
-        direction = np.maximum(g - multiplier[support] * linear, 0.0)
-        return self.restore(direction)
+        within = np.flatnonzero(positive > multiplier * linear)
+        if not len(within):  # mix below rounding: the maximiser is a vertex
+            return Simplex().linear_max(g)
+        return self.restore(np.maximum(g - multiplier[within[-1]] * linear, 0.0))
 
     def project(self, x: FloatArray) -> FloatArray:
         """Return the point of the surface nearest to x, for x outside the body; inside, the radial point is returned.
@@ -108,11 +109,9 @@ class ElasticNet:
             if self._level(np.maximum(x, 0.0)) <= 0.0:
                 return self.restore(x)
         count, s, q = np.arange(1, len(positive) + 1), np.cumsum(positive), np.cumsum(positive**2)
-        if self.mix == 0.0:
-            multiplier = (s - 1.0) / count
-        else:
-            excess = (linear * s + self.mix * q - 1.0) / (4.0 * self.mix + count * linear**2)
-            multiplier = (np.sqrt(np.maximum(1.0 + 4.0 * self.mix * excess, 0.0)) - 1.0) / (2.0 * self.mix)
+        # The root of a quadratic, in the form that loses no digits as mix -> 0 (there it is (s - 1) / count).
+        excess = (linear * s + self.mix * q - 1.0) / (4.0 * self.mix + count * linear**2)
+        multiplier = 2.0 * excess / (1.0 + np.sqrt(np.maximum(1.0 + 4.0 * self.mix * excess, 0.0)))
         support = int(np.flatnonzero(positive > multiplier * linear)[-1])
         return self.restore(np.maximum(x - multiplier[support] * linear, 0.0))
 
