@@ -129,17 +129,20 @@ class Problem:
     def fix(self, **values: FloatArray) -> Problem:
         """Return the problem in the other variables, with the named ones constant.
 
-        Raises `ModelError` if a name is not a variable, or none would be left.
+        Raises `ModelError` if a name is not a variable, a value has another shape, or no variable would be left.
         """
         known = {variable.name for variable in self.variables}
         if unknown := sorted(set(values) - known):
             raise ModelError(f"problem {self.name!r} has no variable {unknown[0]!r}; it has {sorted(known)}")
         if not known - set(values):
             raise ModelError(f"problem {self.name!r}: fixing every variable leaves nothing to solve")
-        terms = [term.fix(values) for term in self.objective.terms]
+        for variable in self.variables:
+            if variable.name in values and np.shape(values[variable.name]) != variable.shape:
+                given = np.shape(values[variable.name])
+                raise ModelError(f"{variable.name!r} is fixed at an array of shape {given}; it has {variable.shape}")
         constant = self.objective.constant
         constant += sum(term.value_and_gradient(values)[0] for term in self.objective.terms if _within(term, values))
-        free = tuple(term for term in terms if term.variables)
+        free = tuple(term.fix(values) for term in self.objective.terms if not _within(term, values))
         memberships = tuple(member for member in self.memberships if member.variable.name not in values)
         constraints = {key: item for key, item in self.constraints.items() if item[0].name not in values}
         objective = replace(self.objective, terms=free, constant=constant)

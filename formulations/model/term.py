@@ -65,9 +65,11 @@ class Applied:
         """Return the weighted value and the weighted gradient by variable name."""
         value, gradient = self.term.value_and_gradient(*(values[variable.name] for variable in self.variables))
         parts = gradient if isinstance(gradient, tuple) else (gradient,)
-        return self.weight * value, {
-            variable.name: self.weight * np.asarray(part) for variable, part in zip(self.variables, parts, strict=True)
-        }
+        total: dict[str, FloatArray] = {}
+        for variable, part in zip(self.variables, parts, strict=True):  # f(u, u) has two parts for u
+            scaled = self.weight * np.asarray(part)
+            total[variable.name] = total[variable.name] + scaled if variable.name in total else scaled
+        return self.weight * value, total
 
     def fix(self, values: Mapping[str, FloatArray]) -> Applied:
         """Return the term with the named variables constant."""
