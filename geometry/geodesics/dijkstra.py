@@ -103,6 +103,7 @@ def _symmetric_graph(ends: IntArray, lengths: FloatArray, count: int) -> csr_arr
     order = np.lexsort((lengths, ends[:, 1], ends[:, 0]))
     ends, lengths = ends[order], lengths[order]
     shortest = np.r_[True, (ends[1:] != ends[:-1]).any(axis=1)]
-    i, j = ends[shortest].T
+    # csgraph works on 32-bit indices: wider ones would be copied at every call.
+    i, j = ends[shortest].T.astype(np.int32)
     w = lengths[shortest]
     return csr_array((np.r_[w, w], (np.r_[i, j], np.r_[j, i])), shape=(count, count))

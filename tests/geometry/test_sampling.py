@@ -32,7 +32,7 @@ def shuffled(mesh: Mesh, seed: int) -> tuple[Mesh, IntArray]:
     new = np.argsort(old)
     faces = np.roll(new[mesh.faces][rng.permutation(len(mesh.faces))], rng.integers(3), axis=1)
     moved = Mesh(mesh.vertices[old], faces).transformed(
-        rotation=Rotation.random(rng=rng).as_matrix(),
+        rotation=Rotation.random(None, rng).as_matrix(),
         translation=rng.normal(size=3),
         scale=float(rng.uniform(0.01, 90)),
     )

@@ -138,7 +138,7 @@ def test_rigid_motion_scale_and_order_leave_nearly_all_rows_alone(interpolation:
     rng = np.random.default_rng(5)
     order = rng.permutation(642)
     moved = Mesh(BLOB.vertices[order], np.argsort(order)[BLOB.faces]).transformed(
-        rotation=Rotation.random(rng=rng).as_matrix(), translation=[5, -3, 9], scale=37.0
+        rotation=Rotation.random(None, rng).as_matrix(), translation=[5, -3, 9], scale=37.0
     )
     before = shot(BLOB, RADIUS, interpolation=interpolation)[order]  # type: ignore[arg-type]
     after = shot(moved, 37.0 * RADIUS, interpolation=interpolation)  # type: ignore[arg-type]
@@ -169,6 +169,6 @@ def test_senseless_requests_are_refused() -> None:
 def test_rigid_motion_leaves_nearly_all_rows_of_a_real_shape_alone(data: Path) -> None:
     mesh = clean(read_mesh(data / "shrec16" / "null" / "wolf.off")).mesh
     radius = 0.06 * np.sqrt(mesh.area)
-    turned = mesh.transformed(rotation=Rotation.random(rng=np.random.default_rng(2)).as_matrix(), translation=50.0)
+    turned = mesh.transformed(rotation=Rotation.random(None, np.random.default_rng(2)).as_matrix(), translation=50.0)
     same = np.abs(shot(mesh, radius) - shot(turned, radius)).max(axis=1) < 1e-6
     assert same.mean() >= 0.97
