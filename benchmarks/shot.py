@@ -1,7 +1,8 @@
 """SHOT of all points at once, against a plain Python loop over points and neighbours.
 
-Run: python benchmarks/shot.py [mesh.off]. Without a mesh, a bumpy ball of 10 242 vertices is used. The loop is timed on 40
-points spread over the surface and extrapolated to all of them.
+Run: python benchmarks/shot.py [mesh.off]. Without a mesh, a bumpy ball of 10 242 vertices is used. The loop is timed on
+40 points spread over the surface and extrapolated to all of them. It has no rule for a frame with as many neighbours on
+either side, so a row or two may differ.
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ def main() -> None:
     n = len(mesh.vertices)
     tree, sample = cKDTree(mesh.vertices), farthest_points(mesh, 40)
     print(f"{mesh.name}: {n} vertices; radius in sqrt(area); loop extrapolated from {len(sample)} points")  # noqa: T201
-    print("radius   neighbours   all at once [s]   us/pair   loop [s]   ratio (target >= 20)   largest gap")  # noqa: T201
+    print("radius   neighbours   all at once [s]   us/pair   loop [s]   ratio (target >= 20)   equal to 1e-12")  # noqa: T201
     for share in (0.05, 0.10):
         radius = share * np.sqrt(mesh.area)
         pairs = int(tree.query_ball_point(mesh.vertices, radius, return_length=True).sum()) - n
@@ -76,10 +77,10 @@ def main() -> None:
         begin = time.process_time()
         looped = np.array([shot_by_loop(mesh, tree, int(vertex), radius) for vertex in sample])
         peer = (time.process_time() - begin) * n / len(sample)
-        gap = np.abs(looped - rows[sample]).max()
+        equal = int((np.abs(looped - rows[sample]).max(axis=1) < 1e-12).sum())
         print(  # noqa: T201
             f"{share:6.2f}   {pairs / n:10.0f}   {ours:15.2f}   {ours / pairs * 1e6:7.2f}   {peer:8.1f}   "
-            f"{peer / ours:21.0f}   {gap:11.1e}"
+            f"{peer / ours:21.0f}   {equal:8d} of {len(sample)}"
         )
 
 
