@@ -18,14 +18,15 @@ def geodesic_errors(
 ) -> FloatArray:
     """Return the geodesic distance between matched and true points, divided by the square root of the full area.
 
-    error = d(y, y*) / sqrt(|M|). The distance between two points inside faces is the least of three lengths:
+    error = d(y, y*) / sqrt(|M|). The distance between points inside faces is the lesser of two lengths:
 
-    1. sum_ij b_i c_j d(i, j), the distances between the corners of their faces, interpolated by both points' weights;
+    1. |y - y*| + sum_ij b_i c_j (d(i, j) - |i - j|): the chord, and by how much the distances between the corners of
+       the two faces exceed their chords, interpolated by both points' weights; but the straight way, if the faces are
+       the same or share an edge (over which they are unfolded);
     2. min_ij |y - i| + d(i, j) + |j - y*|, the way through a corner of each face;
-    3. the straight way, if the faces are the same or share an edge (over which they are unfolded).
 
-    All three are upper bounds of the true distance on a flat piece (the first by convexity); far apart the first is
-    tight to second order in the edge length, near by the third is exact. At vertices all this is d(i, j) itself, and
+    and never less than the chord. Distances themselves have a kink at the source and interpolate badly near by; their
+    excess over the chord is smooth, and zero where the surface is flat. At vertices all this is d(i, j) itself, and
     equal points have distance 0.
 
     Parameters
@@ -85,14 +86,20 @@ def point_distances(mesh: Mesh, a: SurfacePoints, b: SurfacePoints, *, geodesics
     point, i, j = np.nonzero(pair)
     between = np.full(pair.shape, np.inf)
     between[point, i, j] = vertex_pair_distances(mesh, corner_a[point, i], corner_b[point, j], geodesics=geodesics)
-    weight = a.barycentric[:, :, None] * b.barycentric[:, None, :]
-    interpolated = np.where(pair, weight * np.where(pair, between, 0.0), 0.0).sum(axis=(1, 2))
+    excess = np.zeros(pair.shape)
+    chord_of_corners = np.linalg.norm(mesh.vertices[corner_a[point, i]] - mesh.vertices[corner_b[point, j]], axis=1)
+    excess[point, i, j] = between[point, i, j] - chord_of_corners
     place_a, place_b = a.positions(mesh), b.positions(mesh)
+    chord = np.linalg.norm(place_a - place_b, axis=1)
+    weight = np.where(pair, a.barycentric[:, :, None] * b.barycentric[:, None, :], 1.0)
+    interpolated = chord + (weight * excess).sum(axis=(1, 2))
     to_a = np.linalg.norm(mesh.vertices[corner_a] - place_a[:, None], axis=2)
     to_b = np.linalg.norm(mesh.vertices[corner_b] - place_b[:, None], axis=2)
     through = (to_a[:, :, None] + between + to_b[:, None, :]).min(axis=(1, 2))
     straight = _straight(mesh, a.faces, b.faces, place_a, place_b)
-    return np.minimum(np.minimum(interpolated, through), straight)
+    direct = np.where(np.isfinite(straight), straight, interpolated)
+    # No way is shorter than the chord; the heat method alone can say so.
+    return np.asarray(np.maximum(np.minimum(direct, through), chord), dtype=np.float64)
 
 
 def _onto(view: CleanMesh, points: SurfacePoints) -> SurfacePoints:
@@ -133,4 +140,4 @@ def _over_edge(p: FloatArray, q: FloatArray, start: FloatArray, end: FloatArray)
     share = np.divide(height_p, height, out=np.zeros_like(height), where=height > 0)
     # The length is convex in the crossing point, so that the best one on the edge is the free one, clamped.
     crossing = np.clip(along_p + (along_q - along_p) * share, 0.0, base)
-    return np.asarray(np.hypot(along_p - crossing, height_p) + np.hypot(along_q - crossing, height_q))
+    return np.asarray(np.hypot(along_p - crossing, height_p) + np.hypot(along_q - crossing, height_q), dtype=np.float64)

@@ -17,7 +17,7 @@ from nonrigid.geometry.geodesics import virtual_edge_graph
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.points import SurfacePoints
 
-THRESHOLDS: FloatArray = np.arange(51) * 0.005
+THRESHOLDS: FloatArray = np.linspace(0.0, 0.25, 51)
 """(51,) thresholds of the error curve, 0 to 0.25, in units of sqrt(area of the full shape)."""
 
 COVERAGE_RADIUS = 0.1
@@ -94,8 +94,8 @@ def score(pair: PairData, points: SurfacePoints, *, geodesics: str = "dijkstra")
     InputError
         If the pair has no ground truth, or `points` has not one row a vertex of the part, or a matched vertex has none.
 
-    Source: Cosmo et al. 2016, "SHREC'16: Partial Matching of Deformable Shapes", section 4. Its text leaves open whether
-    the better of the two sides is taken for a shape or for a point; both means are given.
+    Source: Cosmo et al. 2016, "SHREC'16: Partial Matching of Deformable Shapes", section 4. Its text leaves open
+    whether the better of the two sides is taken for a shape or for a point; both means are given.
     """
     if pair.truth is None:
         raise InputError(f"pair {pair.name} has no ground truth", remedy="write a submission file instead")

@@ -8,7 +8,7 @@ from scipy.sparse.csgraph import dijkstra
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.cache import default_cache
 from nonrigid.geometry.errors import UnknownNameError
-from nonrigid.geometry.geodesics import make_geodesics, virtual_edge_graph
+from nonrigid.geometry.geodesics import EdgeFlip, make_geodesics, virtual_edge_graph
 from nonrigid.geometry.mesh import Mesh
 
 METRICS = ("dijkstra", "edgeflip", "exact", "heat")
@@ -55,8 +55,6 @@ def vertex_pair_distances(mesh: Mesh, a: IntArray, b: IntArray, *, geodesics: st
 
 def _by_geodesics(mesh: Mesh, a: IntArray, b: IntArray, method: str) -> FloatArray:
     if method == "edgeflip":
-        from nonrigid.geometry.geodesics import EdgeFlip
-
         pairs, place = np.unique(np.sort(np.stack([a, b], axis=1), axis=1), axis=0, return_inverse=True)
         return np.asarray(EdgeFlip(mesh).distance_pairs(pairs[:, 0], pairs[:, 1])[place.ravel()], dtype=np.float64)
     solver = make_geodesics(mesh, method)

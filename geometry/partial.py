@@ -128,8 +128,8 @@ def face_pieces(mesh: Mesh, keep_faces: ArrayLike | None = None) -> IntArray:
     node = len(used) + edge_of_side.ravel()
     size = len(used) + len(edges)
     graph = coo_array((np.ones(len(node)), (face_of_side, node)), shape=(size, size))
-    label = connected_components(graph, directed=False)[1][: len(used)]
-    _, label = np.unique(label, return_inverse=True)
+    component = connected_components(graph, directed=False)[1][: len(used)]
+    _, label = np.unique(component, return_inverse=True)
     area = np.bincount(label, weights=mesh.face_areas[used])
     rank = np.empty(len(area), dtype=np.int64)
     rank[np.argsort(-area, kind="stable")] = np.arange(len(area))

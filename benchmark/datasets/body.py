@@ -43,9 +43,10 @@ class Body:
 def build_body(anatomy: Anatomy, vertex_count: int) -> Body:
     """Build the neutral skin of an anatomy with about `vertex_count` vertices.
 
-    The flesh f_i (round cones about bones, and ellipsoids) melts into f = -k log sum_i exp(-f_i / k) with k the anatomy's
-    `blend`; marching cubes triangulate f = 0. Each vertex first belongs to the bone of its nearest flesh; diffusion along
-    the skin over the anatomy's `softness` then makes the weights smooth without reaching from one leg to the other.
+    The flesh f_i (round cones about bones, and ellipsoids) melts into f = -k log sum_i exp(-f_i / k) with k the
+    anatomy's `blend`; marching cubes triangulate f = 0. Each vertex first belongs to the bone of its nearest flesh;
+    diffusion along the skin over the anatomy's `softness` then makes the weights smooth without reaching from one leg
+    to the other.
     """
     anatomy = anatomy.both_sides()
     parts: tuple[Bone | Flesh, ...] = (*anatomy.bones, *anatomy.flesh)
@@ -56,9 +57,12 @@ def build_body(anatomy: Anatomy, vertex_count: int) -> Body:
         total = np.full(len(places), 1e-30)
         for part in parts:
             low, high = _box(part) + 8 * anatomy.blend * np.array([[-1.0], [1.0]])
-            near = np.flatnonzero(((places >= low) & (places <= high)).all(axis=1))
+            near = np.arange(len(places))
+            for axis in (2, 1, 0):
+                here = places[near, axis]
+                near = near[(here >= low[axis]) & (here <= high[axis])]
             total[near] += np.exp(np.minimum(-_distance(part, places[near]) / anatomy.blend, 300.0))
-        return -anatomy.blend * np.log(total)
+        return np.asarray(-anatomy.blend * np.log(total), dtype=np.float64)
 
     coarse = isosurface(field, lower, upper, 0.03)
     # The count goes with the inverse square of the spacing; a coarse try measures the factor for this surface.
@@ -77,11 +81,12 @@ def _distance(part: Bone | Flesh, places: FloatArray) -> FloatArray:
         start, end = np.array(part.start), np.array(part.end)
         along = np.clip((places - start) @ (end - start) / np.sum((end - start) ** 2), 0.0, 1.0)
         gap = np.linalg.norm(places - start - along[:, None] * (end - start), axis=1)
-        return np.asarray(gap - part.radii[0] - along * (part.radii[1] - part.radii[0]))
+        return np.asarray(gap - part.radii[0] - along * (part.radii[1] - part.radii[0]), dtype=np.float64)
     offset, radii = places - np.array(part.centre), np.array(part.radii)
     level = np.linalg.norm(offset / radii, axis=1)
     slope = np.linalg.norm(offset / radii**2, axis=1)
-    return np.where(slope > 1e-9, level * (level - 1.0) / np.maximum(slope, 1e-9), -radii.min())
+    depth = np.where(slope > 1e-9, level * (level - 1.0) / np.maximum(slope, 1e-9), -radii.min())
+    return np.asarray(depth, dtype=np.float64)
 
 
 def _box(part: Bone | Flesh) -> FloatArray:
@@ -98,7 +103,8 @@ def _diffused(skin: Mesh, bone: IntArray, bone_count: int, length: float) -> Flo
     n = len(skin.vertices)
     i, j = skin.edges.T
     adjacency = coo_array((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), shape=(n, n)).tocsr()
-    laplacian = diags_array(adjacency.sum(axis=1)) - adjacency
+    degree: FloatArray = np.bincount(np.r_[i, j], minlength=n).astype(np.float64)
+    laplacian = diags_array(degree) - adjacency
     mean_square = float(np.mean(np.sum((skin.vertices[i] - skin.vertices[j]) ** 2, axis=1)))
     # With six neighbours at distance h the graph Laplacian is 3/2 h^2 times the continuous one.
     step = length**2 / (1.5 * mean_square)

@@ -160,15 +160,15 @@ class _Role:
 def posed_creature(anatomy: Anatomy, pose: int, *, vertices: int, seed: int = 0) -> Arrays:
     """Return a complete pose, the template and the ground truth between them, as arrays by role, kept in the cache.
 
-    The keys are "part vertices", "part faces" (here the whole pose), "full vertices", "full faces" (the template), "truth
-    faces", "truth weights" and the same of "mirrored". The truth of a vertex v of the pose: the closest point of the
-    dense pose, the same triangle and weights on the dense neutral skin, from there the closest point of the template;
-    for the mirrored truth the point of the neutral skin is reflected before the last step.
+    The keys are "part vertices", "part faces" (here the whole pose), "full vertices", "full faces" (the template),
+    "truth faces", "truth weights" and the same of "mirrored". The truth of a vertex of the pose: the closest point of
+    the dense pose, the same triangle and weights on the dense neutral skin, from there the closest point of the
+    template; for the mirrored truth the point of the neutral skin is reflected before the last step.
     """
 
     def build() -> Arrays:
         body = _body(anatomy, vertices)
-        template = _remeshed(body.skin, vertices, _seed(seed, anatomy.name, "template"))
+        template = _template(body, vertices, seed)
         dense = body.posed(anatomy.poses[pose])
         mesh = _remeshed(dense, vertices, _seed(seed, anatomy.name, pose))
         neutral = closest_points(dense, mesh.vertices).positions(body.skin)
@@ -180,12 +180,21 @@ def posed_creature(anatomy: Anatomy, pose: int, *, vertices: int, seed: int = 0)
 
 
 def _body(anatomy: Anatomy, vertices: int) -> Body:
-    count = max(12_000, 26 * vertices // 10)
+    count = 4_000 + 26 * vertices // 10
     stored = default_cache().fetch(
         ("creature body", _RECIPE_VERSION, repr(anatomy), count), lambda: _body_arrays(build_body(anatomy, count))
     )
     skin = Mesh(stored["vertices"], stored["faces"], name=anatomy.name)
     return Body(anatomy=anatomy.both_sides(), skin=skin, weights=np.asarray(stored["weights"], dtype=np.float64))
+
+
+def _template(body: Body, vertices: int, seed: int) -> Mesh:
+    def build() -> Arrays:
+        mesh = _remeshed(body.skin, vertices, _seed(seed, body.anatomy.name, "template"))
+        return {"vertices": mesh.vertices, "faces": mesh.faces}
+
+    stored = default_cache().fetch(("creature template", _RECIPE_VERSION, repr(body.anatomy), vertices, seed), build)
+    return Mesh(stored["vertices"], stored["faces"], name=body.anatomy.name)
 
 
 def _body_arrays(body: Body) -> Arrays:
@@ -196,7 +205,8 @@ def _remeshed(dense: Mesh, vertices: int, seed: int) -> Mesh:
     """Return a decimation that shares neither triangulation nor numbering with that of another pose.
 
     Where a limb moves rigidly the dense triangles are the same in both poses and would collapse in the same order.
-    Hence each dense vertex first slides towards the centre of a random triangle beside it, staying on the dense surface.
+    Hence each dense vertex first slides towards the centre of a random triangle beside it, staying on the dense
+    surface.
     """
     generator = np.random.default_rng(seed)
     face = np.empty(len(dense.vertices), dtype=np.int64)

@@ -37,8 +37,8 @@ def cut_by_plane(
 ) -> BoolArray:
     """Keep what lies on the normal's side of a plane through the template, carried over to a pose by the ground truth.
 
-    A vertex of the pose is on the side on which its true point of the template is; a triangle is kept if all its corners
-    are, so that the boundary follows the triangles. Of the pieces, joined through edges, the largest is kept.
+    A vertex of the pose is on the side on which its true point of the template is; a triangle is kept if all its
+    corners are, so that the boundary follows the triangles. Of the pieces, joined through edges, the largest is kept.
 
     Parameters
     ----------
