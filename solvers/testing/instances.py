@@ -1,0 +1,213 @@
+"""Small problems whose optimum is proved: what every backend is tried on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from nonrigid.formulations.model import (
+    Applicable,
+    Box,
+    Curvature,
+    ElasticNet,
+    Problem,
+    QuadraticForm,
+    Simplex,
+    Smooth,
+    SmoothConstraint,
+    Sphere,
+    Variable,
+    maximize,
+    minimize,
+)
+from nonrigid.geometry.arrays import FloatArray
+from nonrigid.solvers.testing.sets import HalfSquaredDistance
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Instance:
+    """Hold a problem, its proved optimum, a point that attains it, and the proof's name.
+
+    `unimodal` says that every stationary point reachable from the interior is optimal, so that a backend which accepts
+    the problem has no excuse for another answer.
+    """
+
+    problem: Problem
+    optimum: float
+    values: Mapping[str, FloatArray]
+    certificate: str
+    unimodal: bool = True
+
+
+@cache
+def instances() -> tuple[Instance, ...]:
+    """Return all instances."""
+    return tuple(make() for make in _MAKERS)
+
+
+def planted_payoff(count: int = 10, *, rng_seed: int = 0, sharpness: float = 200.0) -> FloatArray:
+    """Return a payoff exp(-sharpness eps^2) of a planted partial matching, (count, count), with conflicts zeroed.
+
+    Half of the candidates are right: points of a unit square seen twice with noise; the others match at random. eps is
+    the difference of two candidates' distances on either side; candidates that share a point conflict.
+
+    Examples
+    --------
+    >>> A = planted_payoff(10)
+    >>> bool((A == A.T).all() and (np.diag(A) == 0).all())
+    True
+    """
+    rng = np.random.default_rng(rng_seed)
+    points = rng.random((count, 2))
+    seen = points + 0.01 * rng.standard_normal(points.shape)
+    left = np.concatenate([np.arange(count - count // 2), rng.integers(0, count, count // 2)])
+    right = np.concatenate([np.arange(count - count // 2), rng.integers(0, count, count // 2)])
+    far = np.linalg.norm(points[left][:, None] - points[left][None], axis=2)
+    apart = np.linalg.norm(seen[right][:, None] - seen[right][None], axis=2)
+    payoff = np.exp(-sharpness * (far - apart) ** 2)
+    payoff[(left[:, None] == left) | (right[:, None] == right)] = 0.0
+    return np.asarray(payoff)
+
+
+def planted_game(count: int = 10, *, rng_seed: int = 0) -> Instance:
+    """Return max u'Au on the simplex for a planted payoff, proved by trying every support.
+
+    Some optimum has a support S on which the equations A u = value, 1'u = 1 have one solution (along a null direction
+    the objective is constant, so the support could shrink); all 2^n - 1 supports are tried.
+
+    Examples
+    --------
+    >>> planted_game().certificate
+    'all 1023 supports'
+    """
+    payoff = planted_payoff(count, rng_seed=rng_seed)
+    best, point = 0.0, np.eye(count)[0]
+    for size in range(2, count + 1):
+        for support in combinations(range(count), size):
+            system = np.block([[payoff[np.ix_(support, support)], -np.ones((size, 1))], [np.ones((1, size)), 0.0]])
+            if abs(np.linalg.det(system)) < 1e-10:
+                continue
+            played = np.linalg.solve(system, np.eye(size + 1)[-1])
+            if played[:-1].min() > 0.0 and played[-1] > best:
+                best, point = float(played[-1]), np.zeros(count)
+                point[list(support)] = played[:-1]
+    u = Variable("u", count)
+    problem = Problem("planted game", maximize(QuadraticForm(payoff)(u)), u @ Simplex())
+    return Instance(
+        problem=problem,
+        optimum=best,
+        values={"u": point},
+        certificate=f"all {2**count - 1} supports",
+        unimodal=False,
+    )
+
+
+def convex_quadratic() -> Instance:
+    """Return min sum d_i x_i^2 on the simplex: x_i = (1/d_i) / sum 1/d, objective 1 / sum 1/d."""
+    d = np.array([1.0, 2.0, 3.0, 5.0, 8.0, 13.0])
+    x = Variable("x", d.size)
+    form = QuadraticForm(np.diag(d), curvature=Curvature.CONVEX)
+    optimum = 1.0 / float(np.sum(1.0 / d))
+    return Instance(
+        problem=Problem("convex quadratic", minimize(form(x)), x @ Simplex()),
+        optimum=optimum,
+        values={"x": optimum / d},
+        certificate="closed form, convex",
+    )
+
+
+def rosenbrock() -> Instance:
+    """Return Rosenbrock's valley in a box whose bound x <= 0.8 is active: f >= (1 - x)^2, attained at y = x^2."""
+
+    def value(x: FloatArray) -> float:
+        return float(100.0 * (x[1] - x[0] ** 2) ** 2 + (1.0 - x[0]) ** 2)
+
+    def gradient(x: FloatArray) -> FloatArray:
+        inner = x[1] - x[0] ** 2
+        return np.array([-400.0 * x[0] * inner - 2.0 * (1.0 - x[0]), 200.0 * inner])
+
+    x = Variable("x", 2)
+    return Instance(
+        problem=Problem("rosenbrock", minimize(Smooth(value, gradient)(x)), x @ Box(-1.5, 0.8)),
+        optimum=0.2**2,
+        values={"x": np.array([0.8, 0.64])},
+        certificate="closed form: a sum of squares, each at its least",
+    )
+
+
+def elastic_net() -> Instance:
+    """Return max (a'u)^2 on the elastic net, mix = 0.8, by the inequality of Cauchy and Schwarz.
+
+    With b = 1 - mix the surface is a sphere about -b/(2 mix) 1 of radius R, R^2 = (1 + n b^2/(4 mix)) / mix.
+    """
+    a, mix = 1.0 + np.linspace(0.0, 0.5, 10), 0.8
+    b = 1.0 - mix
+    radius = np.sqrt((1.0 + a.size * b**2 / (4.0 * mix)) / mix)
+    u = Variable("u", a.size)
+    point = radius * a / np.linalg.norm(a) - b / (2.0 * mix)
+    problem = Problem("elastic net", maximize(QuadraticForm(np.outer(a, a))(u)), u @ ElasticNet(mix=mix))
+    return Instance(problem=problem, optimum=float(a @ point) ** 2, values={"u": point}, certificate="Cauchy-Schwarz")
+
+
+def spectral() -> Instance:
+    """Return max u'Au on the nonnegative sphere for A > 0: the largest eigenvalue, by Perron and Frobenius."""
+    payoff = planted_payoff(10) + 0.05
+    eigenvalues, vectors = np.linalg.eigh(payoff)
+    u = Variable("u", len(payoff))
+    problem = Problem("spectral", maximize(QuadraticForm(payoff)(u)), u @ Sphere())
+    values = {"u": np.abs(vectors[:, -1])}
+    return Instance(problem=problem, optimum=float(eigenvalues[-1]), values=values, certificate="largest eigenvalue")
+
+
+def ball() -> Instance:
+    """Return min |x - t|^2 / 2 with the named constraint x'x <= 1: x = t/|t|."""
+    target = np.array([2.0, -1.0, 2.0])
+    inside = SmoothConstraint("at most", lambda x: (np.array([x @ x - 1.0]), 2.0 * x[None, :]))
+    x = Variable("x", 3)
+    problem = Problem(
+        "ball", minimize(HalfSquaredDistance(target)(x)), x @ Box(-5.0, 5.0), constraints={"in the ball": (x, inside)}
+    )
+    return Instance(problem=problem, optimum=2.0, values={"x": target / 3.0}, certificate="closed form, convex")
+
+
+def two_variables() -> Instance:
+    """Return min |x - y|^2 with x on the simplex and 1 <= y <= 2: x = 1/n, y = 1."""
+    count = 3
+    x, y = Variable("x", count), Variable("y", count)
+    problem = Problem("two variables", minimize(SquaredGap()(x, y)), x @ Simplex(), y @ Box(1.0, 2.0))
+    values = {"x": np.full(count, 1.0 / count), "y": np.ones(count)}
+    return Instance(
+        problem=problem, optimum=(count - 1.0) ** 2 / count, values=values, certificate="closed form, convex"
+    )
+
+
+class SquaredGap(Applicable):
+    """Evaluate |x - y|^2 in two arguments."""
+
+    curvature = Curvature.CONVEX
+    degree = 2
+
+    def value_and_gradient(self, *x: FloatArray) -> tuple[float, tuple[FloatArray, FloatArray]]:
+        """Return the value and its two gradients."""
+        apart = x[0] - x[1]
+        return float(np.sum(apart * apart)), (2.0 * apart, -2.0 * apart)
+
+    def lower(self, x: Any, y: Any, ops: Any) -> Any:
+        """Write the gap in the operations of a symbolic backend."""
+        return ops.sum_squares(x - y)
+
+
+_MAKERS: tuple[Callable[[], Instance], ...] = (
+    planted_game,
+    convex_quadratic,
+    rosenbrock,
+    elastic_net,
+    spectral,
+    ball,
+    two_variables,
+)
