@@ -44,7 +44,8 @@ def run_isolated(problem: Problem, backend: Backend, start: Values, limits: Limi
     if heard.expired:
         status, words = Status.LIMIT, f"killed after {limits.hard_seconds:g} s"
     else:
-        status, words = Status.BACKEND_ERROR, f"the child process ended with exit code {child.exitcode}"
+        status = Status.BACKEND_ERROR
+        words = heard.words or f"the child process ended with exit code {child.exitcode}"
     return _salvaged(problem, backend, status, words, heard, seconds)
 
 
@@ -62,7 +63,10 @@ def _work(pipe: Connection, problem: Problem, backend: Backend, start: Values, l
             sent[0] = now
             pipe.send((point, trace))
 
-    pipe.send(solve_once(problem, backend, start, limits, report))
+    try:
+        pipe.send(solve_once(problem, backend, start, limits, report))
+    except Exception as failure:  # nothing that a third party's `accepts` or bridge raises may look like a crash
+        pipe.send(f"{type(failure).__name__}: {failure}")
     pipe.close()
 
 
@@ -71,6 +75,7 @@ class _Heard:
     """Hold what a child handed over, and whether its time ran out before it said the last word or died."""
 
     answer: Solution | None = None
+    words: str = ""
     best: FloatArray | None = None
     trace: list[TracePoint] = field(default_factory=list)
     expired: bool = False
@@ -86,6 +91,9 @@ def _listen(pipe: Connection, deadline: float) -> _Heard:
             return heard
         if isinstance(message, Solution):
             heard.answer = message
+            return heard
+        if isinstance(message, str):
+            heard.words = message
             return heard
         heard.best, point = message
         heard.trace.append(point)

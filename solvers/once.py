@@ -42,11 +42,8 @@ def solve_once(
     before = time.perf_counter() - begun
     raw, failure = _run(backend, oracle, flat, limits)
     seconds, evaluations = oracle.seconds, oracle.evaluations
-    try:
-        judged = _measured(problem, rewritten, oracle, raw)
-    except Exception as error:  # a term may fail at the last point where it had not at those before
-        judged, failure = None if oracle.best is None else judge(problem, oracle.best), failure or error
-    failure = failure or oracle.failure
+    judged, error = _measured(problem, rewritten, oracle, raw)
+    failure = failure or oracle.failure or error
     status, message = _decide(judged, limits, oracle, failure)
     claims = [bridge.claim for bridge in bridges if bridge.claim is not Claim.EXACT]
     return head.solution(
@@ -116,28 +113,43 @@ def _run(backend: Backend, oracle: Oracle, start: FloatArray, limits: Limits) ->
         return Raw(None, ""), failure
 
 
-def _measured(problem: Problem, rewritten: Rewritten, oracle: Oracle, raw: Raw) -> Judgement | None:
-    """Judge the last point and the best one seen, and return the better; None if there is neither."""
-    found = [] if oracle.best is None else [judge(problem, oracle.best)]
-    if raw.x is not None:
-        last = np.asarray(raw.x, dtype=float)
-        if last.shape != (oracle.size,):
-            raise ValueError(f"the backend returned a point of shape {last.shape}, not {(oracle.size,)}")
-        if np.isfinite(last).all():
-            found.append(judge(problem, rewritten.inverse(oracle.layout.split(last))))
-        if not found or not np.isfinite(found[-1].objective):
-            oracle.interrupted = oracle.interrupted or NotFiniteError("the point returned, or its objective, is NaN")
+def _measured(
+    problem: Problem, rewritten: Rewritten, oracle: Oracle, raw: Raw
+) -> tuple[Judgement | None, Exception | None]:
+    """Judge the last point and the best one seen, and return the better, if any, and what failed on the way."""
+    found: list[Judgement] = []
+    failure: Exception | None = None
+    for point in (oracle.best, raw.x):
+        if point is None:
+            continue
+        try:  # a term may fail here that had not been evaluated before, by a solver that reads the matrix itself
+            found.append(judge(problem, point if point is oracle.best else _returned(raw.x, oracle, rewritten)))
+        except NotFiniteError as error:
+            oracle.interrupted = oracle.interrupted or error
+        except Exception as error:
+            failure = error
     finite = [judged for judged in found if np.isfinite(judged.objective)]
     if not finite:
-        return None
+        if found:
+            oracle.interrupted = oracle.interrupted or NotFiniteError(f"the objective is {found[-1].objective}")
+        return None, failure
     sign = 1.0 if problem.objective.sense is Sense.MINIMIZE else -1.0
     # The last point is preferred to an equally good one seen on the way: it is the more stationary of the two.
     final, first, allowed = finite[-1], finite[0], oracle.limits.feasibility
     margin = 1e-9 * max(1.0, abs(final.objective))
     if first.violation <= allowed:
         worse = final.violation > allowed or sign * first.objective < sign * final.objective - margin
-        return first if worse else final
-    return final
+        return (first if worse else final), failure
+    return final, failure
+
+
+def _returned(x: FloatArray | None, oracle: Oracle, rewritten: Rewritten) -> Values:
+    last = np.asarray(x, dtype=float)
+    if last.shape != (oracle.size,):
+        raise ValueError(f"the backend returned a point of shape {last.shape}, not {(oracle.size,)}")
+    if not np.isfinite(last).all():
+        raise NotFiniteError("the point returned has entries that are not finite")
+    return rewritten.inverse(oracle.layout.split(last))
 
 
 def _decide(judged: Judgement | None, limits: Limits, oracle: Oracle, failure: Exception | None) -> tuple[Status, str]:
