@@ -12,11 +12,16 @@ from numpy.typing import ArrayLike
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.cache import Cache, content_hash, default_cache
 from nonrigid.geometry.clean import CleanMesh, clean
+from nonrigid.geometry.descriptors.heat_kernel import heat_kernel_signature, heat_times
+from nonrigid.geometry.descriptors.shot import shot
+from nonrigid.geometry.descriptors.wave_kernel import wave_energies, wave_kernel_signature
+from nonrigid.geometry.geodesics import make_geodesics
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.operators import Laplacian, laplacian
+from nonrigid.geometry.sampling import canonical_priority, farthest_points
 from nonrigid.geometry.spectrum import Spectrum, spectrum
 
-LARGEST_STORED = 64_000_000
+LARGEST_STORED = 160_000_000
 """Bytes: larger distance matrices are computed again instead of being kept."""
 
 Made = TypeVar("Made")
@@ -85,18 +90,19 @@ class Surface:
         return self._remember(f"laplacian {kind}", lambda: laplacian(self.mesh, kind))
 
     def spectrum(self, k: int, kind: str = "robust") -> Spectrum:
-        """Return the `k` smallest eigenpairs; see `nonrigid.geometry.spectrum.spectrum`."""
+        """Return the `k` smallest eigenpairs; see `nonrigid.geometry.spectrum.spectrum`.
+
+        Where a symmetry of the surface leaves the sign of an eigenfunction open, `canonical_priority` decides it.
+        """
 
         def fresh() -> dict[str, FloatArray]:
-            made = spectrum(self.laplacian(kind), k)
+            made = spectrum(self.laplacian(kind), k, reference=canonical_priority(self.mesh))
             return {"eigenvalues": made.eigenvalues, "eigenfunctions": made.eigenfunctions, "mass": made.mass}
 
         return self._remember(f"spectrum {k} {kind}", lambda: Spectrum(**self._stored(("spectrum", k, kind), fresh)))
 
     def heat_kernel_signature(self, count: int = 16, k: int = 100) -> FloatArray:
         """Return the (n, count) heat kernel signature at logarithmic times, from `k` eigenpairs."""
-        from nonrigid.geometry.descriptors.heat_kernel import heat_kernel_signature, heat_times
-
         basis = self.spectrum(k)
         return self._remember(
             f"heat {count} {k}", lambda: _frozen(heat_kernel_signature(basis, heat_times(basis, count)))
@@ -104,8 +110,6 @@ class Surface:
 
     def wave_kernel_signature(self, count: int = 100, k: int = 100) -> FloatArray:
         """Return the (n, count) wave kernel signature at logarithmic energies, from `k` eigenpairs."""
-        from nonrigid.geometry.descriptors.wave_kernel import wave_energies, wave_kernel_signature
-
         basis = self.spectrum(k)
         return self._remember(
             f"wave {count} {k}", lambda: _frozen(wave_kernel_signature(basis, *wave_energies(basis, count)))
@@ -118,8 +122,6 @@ class Surface:
         interpolation: Literal["quadrilinear", "additive"] = "quadrilinear",
     ) -> FloatArray:
         """Return the (n, 32 cosine_bins) SHOT descriptors; `radius` is in the unit of the vertices."""
-        from nonrigid.geometry.descriptors.shot import shot
-
         key = ("shot", float(radius), cosine_bins, interpolation)
 
         def fresh() -> dict[str, FloatArray]:
@@ -129,8 +131,6 @@ class Surface:
 
     def samples(self, count: int, metric: Literal["euclidean", "geodesic"] = "euclidean") -> IntArray:
         """Return `count` vertices far from one another; see `nonrigid.geometry.sampling.farthest_points`."""
-        from nonrigid.geometry.sampling import farthest_points
-
         key = ("samples", count, metric)
 
         def fresh() -> dict[str, IntArray]:
@@ -149,8 +149,6 @@ class Surface:
         key = ("distances", method, ascending)
 
         def fresh() -> dict[str, FloatArray]:
-            from nonrigid.geometry.geodesics import make_geodesics
-
             made = self._remember(f"geodesics {method}", lambda: make_geodesics(self.mesh, method))
             return {"rows": made.distances(ascending)}
 

@@ -1,0 +1,82 @@
+"""The lazy surface gives the same answers fresh, remembered and from disk."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from nonrigid.geometry import surface as module
+from nonrigid.geometry.cache import Cache
+from nonrigid.geometry.mesh import Mesh
+from nonrigid.geometry.surface import Surface
+
+
+def bumpy() -> Mesh:
+    made = trimesh.creation.icosphere(subdivisions=3)
+    x, y, z = made.vertices.T
+    radius = 1 + 0.3 * np.sin(3 * x + 1) * np.cos(2 * y) + 0.2 * np.sin(4 * z + x)
+    return Mesh(made.vertices * radius[:, None], made.faces, name="bumpy")
+
+
+def everything(surface: Surface) -> dict[str, np.ndarray]:
+    return {
+        "values": surface.spectrum(30).eigenvalues,
+        "functions": surface.spectrum(30, "cotangent").eigenfunctions,
+        "heat": surface.heat_kernel_signature(5, 30),
+        "wave": surface.wave_kernel_signature(6, 30),
+        "shot": surface.shot(0.5, cosine_bins=7),
+        "samples": surface.samples(12),
+        "geodesic samples": surface.samples(12, "geodesic"),
+        "dijkstra": surface.distances([5, 2, 5]),
+        "heat distances": surface.distances(np.array([7]), "heat"),
+    }
+
+
+def test_fresh_remembered_and_stored_answers_are_equal_bit_for_bit(tmp_path: Path) -> None:
+    cache = Cache(tmp_path)
+    fresh = everything(Surface(bumpy(), cache=None))
+    first = Surface(bumpy(), cache=cache)
+    for answers in (everything(first), everything(first), everything(Surface(bumpy(), cache=cache))):
+        for name, value in fresh.items():
+            assert answers[name].tobytes() == value.tobytes(), name
+            assert answers[name].shape == value.shape, name
+    assert cache.info().entries == 7  # two spectra, SHOT, two samplings, two distances; signatures cost nothing
+
+
+def test_shapes_and_order_of_sources() -> None:
+    surface = Surface(bumpy(), cache=None)
+    n = len(surface.mesh.vertices)
+    found = everything(surface)
+    assert found["heat"].shape == (n, 5)
+    assert found["wave"].shape == (n, 6)
+    assert found["shot"].shape == (n, 32 * 7)
+    assert found["dijkstra"].shape == (3, n)
+    assert found["dijkstra"][[0, 1, 2], [5, 2, 5]].tolist() == [0, 0, 0]
+    assert len(set(found["samples"].tolist())) == 12
+    with pytest.raises(ValueError, match="read-only"):
+        found["shot"][0] = 1
+
+
+def test_large_distance_matrices_are_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    surface = Surface(bumpy(), cache=Cache(tmp_path))
+    kept = surface.distances([3, 1])
+    monkeypatch.setattr(module, "LARGEST_STORED", 100)
+    assert np.array_equal(Surface(bumpy(), cache=Cache(tmp_path)).distances([3, 1]), kept)
+    surface.distances([4])
+    assert surface.clean_view.repairs == ()
+    assert Cache(tmp_path).info().entries == 1
+
+
+def test_scaling_and_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NONRIGID_CACHE", str(tmp_path))
+    surface = Surface(bumpy())
+    double = surface.scaled(2.0)
+    assert double.area == pytest.approx(4 * surface.area)
+    assert double.key != surface.key
+    assert Surface(Mesh(bumpy().vertices, bumpy().faces, name="other")).key == surface.key
+    np.testing.assert_allclose(double.distances([0]), 2 * surface.distances([0]), rtol=1e-12)
+    assert len(list(tmp_path.glob("*/*.npz"))) == 2
+    assert repr(surface) == "Surface(bumpy: 642 vertices, 1280 faces)"
