@@ -199,6 +199,34 @@ def test_scale_and_rigid_motion_of_either_surface_change_no_score() -> None:
     assert one.kept_area == pytest.approx(other.kept_area)
 
 
+def renumbered(mesh: Mesh, seed: int) -> tuple[Mesh, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the mesh in another order, with the new number of each vertex and face and the turn of each face."""
+    generator = np.random.default_rng(seed)
+    order, face_order = generator.permutation(len(mesh.vertices)), generator.permutation(len(mesh.faces))
+    turn = generator.integers(0, 3, len(mesh.faces))
+    turned = np.take_along_axis(mesh.faces, (np.arange(3) + turn[:, None]) % 3, axis=1)
+    number, face_number = np.argsort(order), np.argsort(face_order)
+    return Mesh(mesh.vertices[order], number[turned][face_order], name=mesh.name), order, face_number, turn
+
+
+def test_the_order_of_vertices_and_faces_changes_no_score() -> None:
+    full, _, face_number, turn = renumbered(PAIR.full, 1)
+    part, order, _, _ = renumbered(PAIR.part, 2)
+
+    def named(points: SurfacePoints) -> SurfacePoints:
+        shift = (np.arange(3) + turn[points.faces][:, None]) % 3
+        weights = np.take_along_axis(points.barycentric, shift, axis=1)
+        return SurfacePoints(np.where(points.matched, face_number[points.faces], -1), weights)[order]
+
+    points = mixed(np.arange(len(TRUTH)) % 3 == 0, np.arange(len(TRUTH)) % 5 == 0)
+    one = score(PAIR, points)
+    other = score(replace(PAIR, part=part, full=full, truth=named(TRUTH), mirrored=named(MIRRORED)), named(points))
+    assert other.mean_error == pytest.approx(one.mean_error)
+    assert other.mean_error_per_point == pytest.approx(one.mean_error_per_point, abs=1e-12)
+    assert other.coverage == pytest.approx(one.coverage)
+    np.testing.assert_allclose(np.sort(other.direct), np.sort(one.direct), atol=1e-12)
+
+
 def test_coverage_grows_with_the_radius_and_stays_on_the_part() -> None:
     strip = plane(9)
     shares = [coverage(strip, np.array([0]), radius) for radius in (0.5, 2.0, 5.0, 20.0)]
