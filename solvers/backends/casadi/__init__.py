@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any, ClassVar
@@ -99,13 +101,15 @@ class Casadi:
             options["discrete"] = _integral(oracle.problem).tolist()
         solver = ca.nlpsol("solver", plugin, nlp.nlp, options)
         oracle.built()
-        found = solver(
-            x0=np.clip(start, oracle.lower, oracle.upper),
-            lbx=oracle.lower,
-            ubx=oracle.upper,
-            lbg=nlp.row_lower,
-            ubg=nlp.row_upper,
-        )
+        # Bonmin logs each node, and qpoases its licence, through Python's stdout whatever their options say.
+        with contextlib.redirect_stdout(io.StringIO()):
+            found = solver(
+                x0=np.clip(start, oracle.lower, oracle.upper),
+                lbx=oracle.lower,
+                ubx=oracle.upper,
+                lbg=nlp.row_lower,
+                ubg=nlp.row_upper,
+            )
         nlp.served.raise_failure()
         words = str(solver.stats().get("return_status", "no status"))
         return Raw(None if nlp.served.stopped else found["x"].full().ravel(), words)

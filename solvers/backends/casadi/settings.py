@@ -9,9 +9,11 @@ import casadi as ca
 from nonrigid.solvers.backends.casadi.transcription import Transcription
 from nonrigid.solvers.limits import Limits
 
-# QP solvers of CasADi that load here, of those that take a dense Hessian. Not among them: cbc and clp know no quadratic
-# objective, hpipm wants stages, and qpoases prints its licence at every solve.
-QP_PLUGINS = tuple(name for name in ("qrqp", "osqp", "highs", "daqp", "piqp", "proxqp", "ipqp") if ca.has_conic(name))
+# QP solvers of CasADi that load here, of those that take a dense Hessian: cbc and clp know no quadratic
+# objective, and hpipm wants stages.
+QP_PLUGINS = tuple(
+    name for name in ("qrqp", "osqp", "highs", "qpoases", "daqp", "piqp", "proxqp", "ipqp") if ca.has_conic(name)
+)
 _UNBOUNDED = 10**9  # the solvers' own limits on iterations are lifted: the oracle keeps the limits
 _QUIET = {"print_time": False, "error_on_fail": False, "show_eval_warnings": False}
 
@@ -64,6 +66,7 @@ def _sqp(plugin: str, limits: Limits, memory: int) -> dict[str, Any]:
         "qrqp": {"print_iter": False, "print_header": False, "print_info": False},
         "osqp": {"osqp": {"verbose": False, "eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 20000}},
         "highs": {"highs": {"output_flag": False}},
+        "qpoases": {"printLevel": "none"},
         "proxqp": {"proxqp": {"eps_abs": 1e-10, "eps_rel": 0.0, "max_iter": 10000}},
         "ipqp": {"print_iter": False, "print_header": False, "print_info": False},
     }
@@ -85,17 +88,12 @@ def _bonmin(limits: Limits) -> dict[str, Any]:
     options: dict[str, Any] = {
         "print_level": 0,
         "sb": "yes",
-        "bb_log_level": 0,
-        "nlp_log_level": 0,
-        "nlp_log_at_root": 0,
-        "oa_log_level": 0,
-        "milp_log_level": 0,
-        "lp_log_level": 0,
-        "fp_log_level": 0,
-        "algorithm": "B-OA",
+        # Branch and bound on interior points; the outer approximations call such problems infeasible (measured).
+        "algorithm": "B-BB",
+        
         "allowable_gap": 0.1 * limits.tolerance,
         "allowable_fraction_gap": 0.1 * limits.tolerance,
-        "integer_tolerance": 1e-9,
+        "integer_tolerance": 1e-8,
     }
     if limits.seconds is not None:
         options["time_limit"] = limits.seconds
