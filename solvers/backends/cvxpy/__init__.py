@@ -1,0 +1,122 @@
+"""CVXPY's solvers: convex problems in one solve, others by successive convexification or as nonlinear programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import ClassVar
+
+import cvxpy as cp
+
+from nonrigid.formulations.model import Problem
+from nonrigid.geometry.arrays import FloatArray
+from nonrigid.solvers.acceptance import Acceptance, Native, Refused, Via, via
+from nonrigid.solvers.backend import Raw
+from nonrigid.solvers.backends.cvxpy.lowering import Lowered, is_convex, set_obstacle, size_of
+from nonrigid.solvers.backends.cvxpy.settings import CONIC, NONLINEAR, QUADRATIC, convex_options, nonlinear_options
+from nonrigid.solvers.backends.cvxpy.successive import successive
+from nonrigid.solvers.bridges.body import ToBody
+from nonrigid.solvers.limits import Limits
+from nonrigid.solvers.oracle import Oracle
+
+_LARGEST_NONLINEAR = 1000
+_PACKAGES = {"CLARABEL": "clarabel", "SCS": "scs", "OSQP": "osqp", "PIQP": "piqp", "HIGHS": "highspy"}
+
+
+@dataclass(frozen=True)
+class Cvxpy:
+    """Solve problems by the solvers that CVXPY drives.
+
+    A problem that declares itself convex, and that CVXPY verifies to be so from the formulas of its terms, is solved
+    once; any other by a sequence of convex models (`nonrigid.solvers.backends.cvxpy.successive`). The algorithms
+    nlp-UNO and nlp-IPOPT hand the formulas to CVXPY's nonlinear mode.
+
+    Parameters
+    ----------
+    algorithm
+        "CLARABEL", "SCS", "OSQP", "PIQP", "HIGHS", "nlp-UNO" or "nlp-IPOPT".
+
+    Examples
+    --------
+    >>> Cvxpy("CLARABEL").name
+    'cvxpy'
+    """
+
+    algorithm: str = ""
+    name: ClassVar[str] = "cvxpy"
+    algorithms: ClassVar[tuple[str, ...]] = CONIC + QUADRATIC + NONLINEAR
+
+    @classmethod
+    def default_algorithm(cls, problem: Problem) -> str:
+        """Return CLARABEL, which takes every convex model."""
+        return "CLARABEL"
+
+    def accepts(self, problem: Problem) -> Acceptance:
+        """Take sets whose formulas are known; curved surfaces through their convex bodies."""
+        if self.algorithm in NONLINEAR:
+            return self._accepts_nonlinear(problem)
+        if self.algorithm not in cp.installed_solvers():
+            return Refused(f"{self.algorithm}: CVXPY does not find it; install {_PACKAGES[self.algorithm]}")
+        obstacle = set_obstacle(problem, quadratic=self.algorithm in CONIC)
+        if obstacle is not None:
+            return Refused(f"{self.algorithm}: {obstacle}")
+        if all(member.set.convex for member in problem.memberships):
+            return Native()
+        taken: Via | Refused = via(problem, ToBody())
+        return taken
+
+    def run(self, oracle: Oracle, start: FloatArray, limits: Limits) -> Raw:
+        """Solve once where the problem is convex, else step by step."""
+        lowered = Lowered(oracle)
+        if self.algorithm in NONLINEAR:
+            return self._nonlinear(lowered, oracle, start, limits)
+        if is_convex(oracle.problem):
+            program = cp.Problem(cp.Minimize(lowered.objective()), lowered.constraints)
+            if program.is_dcp():
+                return self._once(program, lowered, oracle, limits)
+        x, words = successive(lowered, oracle, start, self.algorithm, limits)
+        return Raw(x, words)
+
+    @classmethod
+    def versions(cls) -> dict[str, str]:
+        """Return the versions of CVXPY and of the solvers it drives."""
+        return {name: version(name) for name in ("cvxpy", *_PACKAGES.values(), "unopy")}
+
+    def _once(self, program: cp.Problem, lowered: Lowered, oracle: Oracle, limits: Limits) -> Raw:
+        program.get_problem_data(self.algorithm)
+        oracle.built()
+        program.solve(solver=self.algorithm, **convex_options(self.algorithm, limits, limits.seconds))
+        return _answer(program, lowered, oracle)
+
+    def _nonlinear(self, lowered: Lowered, oracle: Oracle, start: FloatArray, limits: Limits) -> Raw:
+        program = cp.Problem(cp.Minimize(lowered.objective()), lowered.constraints)
+        lowered.set(start)
+        solver = self.algorithm.removeprefix("nlp-")
+        program.solve(nlp=True, solver=solver, **nonlinear_options(self.algorithm, limits))
+        return _answer(program, lowered, oracle)
+
+    def _accepts_nonlinear(self, problem: Problem) -> Acceptance:
+        solver = self.algorithm.removeprefix("nlp-")
+        if solver not in cp.installed_solvers():
+            why = "it needs cyipopt, and casadi:ipopt is the same solver" if solver == "IPOPT" else "install unopy"
+            return Refused(f"{self.algorithm}: CVXPY does not find it: {why}")
+        for applied in problem.objective.terms:
+            if not hasattr(applied.term, "lower"):
+                return Refused(f"{self.algorithm}: it needs the formula of every term, and {applied} has no `lower`")
+        obstacle = set_obstacle(problem, quadratic=True)
+        if obstacle is None and size_of(problem) > _LARGEST_NONLINEAR:
+            obstacle = (
+                f"it factorises a dense Hessian, O(n^3) a step: {size_of(problem)} unknowns, at most "
+                f"{_LARGEST_NONLINEAR} work; use casadi:ipopt"
+            )
+        return Native() if obstacle is None else Refused(f"{self.algorithm}: {obstacle}")
+
+
+def _answer(program: cp.Problem, lowered: Lowered, oracle: Oracle) -> Raw:
+    found = lowered.point()
+    if found is not None:
+        oracle.observe(found)
+    return Raw(found, str(program.status))
+
+
+BACKEND = Cvxpy
