@@ -20,7 +20,7 @@ def pairwise_frank_wolfe(
 
     The objective never falls; a strategy whose share is used up stays at exactly 0.
 
-    Source: Lacoste-Julien and Jaggi, on the global linear convergence of Frank-Wolfe variants (NeurIPS 2015), section 2.
+    Source: Lacoste-Julien and Jaggi, on the global linear convergence of Frank-Wolfe variants (NeurIPS 2015).
     """
     ascent = Ascent(game, oracle, limits)
     payoff = ascent.payoff

@@ -24,7 +24,7 @@ class Payoff:
     --------
     >>> payoff = Payoff(np.array([[0.0, 2.0], [2.0, 0.0]]))
     >>> payoff.product(np.array([0.0, 1.0]))
-    (array([2., 0.]), 1)
+    (array([2., 0.]), 2)
     """
 
     def __init__(self, matrix: Any) -> None:

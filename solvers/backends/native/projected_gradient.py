@@ -11,6 +11,8 @@ from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.oracle import Oracle
 from nonrigid.solvers.structure import QuadraticGame
 
+_PATIENCE = 50  # steps that may pass without a visible gain: the gap falls on after the objective has settled
+
 
 def projected_gradient(
     game: QuadraticGame, oracle: Oracle, start: FloatArray, limits: Limits
@@ -27,18 +29,23 @@ def projected_gradient(
     surface = game.surface
     x, g = ascent.begin(start)
     mean = float(x @ g)
-    length = 1.0 / max(float(g.max()), 1e-300)
+    length, reference, idle = 1.0 / max(float(g.max()), 1e-300), mean, 0
     while True:
         excess = float(g @ surface.linear_max(g)) - mean
+        target = _project(surface, x + length * g)
         if ascent.met(excess, mean):
-            return x, "gap below tolerance"
-        direction = _project(surface, x + length * g) - x
-        slope, squared = float(g @ direction), float(direction @ direction)
-        if slope <= 1e-16 * mean:
+            return _cleaned(ascent, x, target, mean), "gap below tolerance"
+        direction = target - x
+        # On the simplex 1'd = 0 but for rounding, which would drown a small slope.
+        slope = float((g - mean) @ direction) if surface.mix == 0.0 else float(g @ direction)
+        squared = float(direction @ direction)
+        idle = 0 if mean > reference * (1.0 + 1e-13) else idle + 1
+        if squared == 0.0 or idle > _PATIENCE:
             return x, "no ascent beyond rounding"
+        reference = max(reference, mean) if idle == 0 else reference
         change = ascent.product(direction)
         bend = float(direction @ change)
-        step = min(1.0, -slope / bend) if bend < 0.0 else 1.0
+        step = min(1.0, max(0.0, -slope / bend)) if bend < 0.0 else 1.0
         x, g = x + step * direction, g + step * change
         np.maximum(x, 0.0, out=x)
         level = float(surface.gauge_and_gradient(x)[0])
@@ -46,6 +53,18 @@ def projected_gradient(
         mean = float(x @ g)
         ascent.show(x, mean)
         length = squared / max(abs(bend), 1e-12 * squared)
+
+
+def _cleaned(ascent: Ascent, x: FloatArray, target: FloatArray, mean: float) -> FloatArray:
+    """Return the projection itself, whose zeros are exact, where it is no worse than the point of the chord."""
+    target = ascent.surface.restore(target)
+    g = ascent.product(target)
+    value = float(target @ g)
+    settled = ascent.met(float(g @ ascent.surface.linear_max(g)) - value, value)
+    if not settled or value < mean * (1.0 - 1e-12):
+        return x
+    ascent.show(target, value)
+    return target
 
 
 def _project(surface: ElasticNet, z: FloatArray) -> FloatArray:
