@@ -147,6 +147,7 @@ class Oracle:
     def observe(self, x: FloatArray, *, objective: float | None = None) -> None:
         """Judge an iterate and keep it if it is the best; backends that do not evaluate at their iterates call it.
 
+        Raises `NotFiniteError` where the objective of the restored point is not finite.
         `objective` may be given, in the user's sense, where it is known at x; it is used only if x needs no restoring.
         """
         begun = time.perf_counter()
@@ -169,6 +170,8 @@ class Oracle:
             if kept and self._report is not None:
                 self._report(Layout(self.original).join(values), point)
         self._paused += time.perf_counter() - begun
+        if not np.isfinite(objective):
+            self._interrupt(NotFiniteError(f"the objective is {objective} at an iterate restored onto its sets"))
 
     def _interrupt(self, signal: LimitReached | NotFiniteError) -> None:
         # Some libraries swallow exceptions of their callbacks, so the signal is also kept where `solve` sees it.

@@ -22,7 +22,7 @@ from nonrigid.solvers.testing.errors import ConformanceError, distance, expect
 from nonrigid.solvers.testing.faulty_terms import Failing, NotANumber, Slow
 from nonrigid.solvers.testing.instances import Instance, instances
 
-_BUDGET = Limits(seconds=20.0, hard_seconds=40.0)
+_BUDGET = Limits(evaluations=1000, seconds=20.0, hard_seconds=40.0)
 
 
 def check_backend(
@@ -117,7 +117,11 @@ def _accepted(name: str, backend: Backend, instance: Instance) -> str | None:
         found=repr(backend.algorithm),
         look="default_algorithm",
     )
-    answer = backend.accepts(problem)
+    try:
+        answer = backend.accepts(problem)
+    except Exception as failure:
+        words = f"{type(failure).__name__}: {failure}"
+        raise ConformanceError(name, expected="an answer to every problem", found=words, look="accepts") from failure
     expect(
         isinstance(answer, Native | Via | Refused),
         name,
