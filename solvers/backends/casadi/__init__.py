@@ -52,7 +52,7 @@ class Casadi:
     """
 
     algorithm: str = ""
-    memory: int = 10
+    memory: int = 6
     bound_push: float = 1e-8
     name: ClassVar[str] = "casadi"
     algorithms: ClassVar[tuple[str, ...]] = (

@@ -90,7 +90,6 @@ def _bonmin(limits: Limits) -> dict[str, Any]:
         "sb": "yes",
         # Branch and bound on interior points; the outer approximations call such problems infeasible (measured).
         "algorithm": "B-BB",
-        
         "allowable_gap": 0.1 * limits.tolerance,
         "allowable_fraction_gap": 0.1 * limits.tolerance,
         "integer_tolerance": 1e-8,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib.metadata import version
-from typing import ClassVar
+from typing import Any, ClassVar
 
-import cvxpy as cp
+import cvxpy
 
 from nonrigid.formulations.model import Problem
 from nonrigid.geometry.arrays import FloatArray
@@ -18,6 +18,8 @@ from nonrigid.solvers.backends.cvxpy.successive import successive
 from nonrigid.solvers.bridges.body import ToBody
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.oracle import Oracle
+
+cp: Any = cvxpy  # its types are incomplete
 
 _LARGEST_NONLINEAR = 1000
 _PACKAGES = {"CLARABEL": "clarabel", "SCS": "scs", "OSQP": "osqp", "PIQP": "piqp", "HIGHS": "highspy"}
@@ -82,7 +84,7 @@ class Cvxpy:
         """Return the versions of CVXPY and of the solvers it drives."""
         return {name: version(name) for name in ("cvxpy", *_PACKAGES.values(), "unopy")}
 
-    def _once(self, program: cp.Problem, lowered: Lowered, oracle: Oracle, limits: Limits) -> Raw:
+    def _once(self, program: Any, lowered: Lowered, oracle: Oracle, limits: Limits) -> Raw:
         program.get_problem_data(self.algorithm)
         oracle.built()
         program.solve(solver=self.algorithm, **convex_options(self.algorithm, limits, limits.seconds))
@@ -112,7 +114,7 @@ class Cvxpy:
         return Native() if obstacle is None else Refused(f"{self.algorithm}: {obstacle}")
 
 
-def _answer(program: cp.Problem, lowered: Lowered, oracle: Oracle) -> Raw:
+def _answer(program: Any, lowered: Lowered, oracle: Oracle) -> Raw:
     found = lowered.point()
     if found is not None:
         oracle.observe(found)

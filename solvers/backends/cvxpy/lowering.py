@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import cvxpy as cp
+import cvxpy
 import numpy as np
 
 from nonrigid.formulations.model import Applied, Curvature, Problem, Sense
@@ -12,6 +12,8 @@ from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.backends.cvxpy.ops import CvxpyOps
 from nonrigid.solvers.layout import Layout
 from nonrigid.solvers.oracle import Oracle
+
+cp: Any = cvxpy  # its types are incomplete
 
 
 class Lowered:
@@ -21,7 +23,7 @@ class Lowered:
         self.layout = oracle.layout
         self.problem = oracle.problem
         self.sign = 1.0 if self.problem.objective.sense is Sense.MINIMIZE else -1.0
-        self.variables = {v.name: cp.Variable(v.shape, name=v.name) for v in self.problem.variables}
+        self.variables: dict[str, Any] = {v.name: cp.Variable(v.shape, name=v.name) for v in self.problem.variables}
         self.constraints = [row for member in self.problem.memberships for row in self._membership(member)]
         for variable, condition in self.problem.constraints.values():
             self.constraints.append(self._affine(variable, condition))

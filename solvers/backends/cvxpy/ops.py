@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import cvxpy as cp
+import cvxpy
+
+cp: Any = cvxpy  # its types are incomplete
 
 
 class CvxpyOps:
@@ -13,7 +15,7 @@ class CvxpyOps:
     Examples
     --------
     >>> import numpy as np
-    >>> x = cp.Variable(2)
+    >>> x = cvxpy.Variable(2)
     >>> CvxpyOps().quadratic(np.eye(2), x).is_convex(), CvxpyOps().quadratic(-np.eye(2), x).is_convex()
     (True, False)
     """

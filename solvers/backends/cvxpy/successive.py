@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-import cvxpy as cp
+import cvxpy
 import numpy as np
 
 from nonrigid.formulations.model import Applied
@@ -14,6 +15,8 @@ from nonrigid.solvers.backends.cvxpy.settings import convex_options
 from nonrigid.solvers.judge import restore
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.oracle import Oracle
+
+cp: Any = cvxpy  # its types are incomplete
 
 _GROWTH, _FADE = 4.0, 0.25  # factors of the proximal weight after a step refused, and its least after one accepted
 _PATIENCE = 12  # refused steps in a row after which the inner solver's accuracy is spent
