@@ -12,10 +12,11 @@ import numpy as np
 from nonrigid.formulations.model import Problem
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.geometry.errors import InputError
-from nonrigid.solvers.acceptance import Acceptance, Bridge
+from nonrigid.solvers.acceptance import Acceptance, Bridge, Refused
 from nonrigid.solvers.backend import Raw
 from nonrigid.solvers.bridges.body import ToBody
 from nonrigid.solvers.bridges.radial import Radial
+from nonrigid.solvers.bridges.squares import Squares
 from nonrigid.solvers.capability import Capability, accept
 from nonrigid.solvers.layout import FlatConstraint
 from nonrigid.solvers.limits import Limits
@@ -29,8 +30,8 @@ _CAPABILITIES = {
     "LD_SLSQP": Capability(
         equal=True,
         at_most=True,
-        largest=300,
-        because="SLSQP solves a dense least-squares problem of n^2 entries a step",
+        largest=200,
+        because="SLSQP solves a dense least-squares problem a step, seconds at n = 300",
     ),
     "LD_LBFGS": _BOUNDS_ONLY,
     "LD_TNEWTON_PRECOND_RESTART": _BOUNDS_ONLY,
@@ -50,10 +51,15 @@ _CAPABILITIES = {
     ),
 }
 _BRIDGES: dict[str, tuple[tuple[Bridge, ...], ...]] = {
-    "auto": ((), (Radial(),), (ToBody(),)),
     "body": ((ToBody(),),),
     "radial": ((Radial(),),),
+    "squares": ((Squares(),),),
 }
+_AUTO: tuple[tuple[Bridge, ...], ...] = ((), (Radial(),), (ToBody(),))
+# Methods that gather curvature lose it at every bound that becomes active, of which there are n at a sparse answer.
+_AUTO_FREE: tuple[tuple[Bridge, ...], ...] = ((), (Squares(),))
+_FREE = ("LD_LBFGS", "LD_VAR1", "LD_VAR2", "LD_TNEWTON")
+_MEMORY = 20  # pairs of a limited-memory method; NLopt's own choice, 1.3 million numbers, makes their use the main cost
 
 
 @dataclass(frozen=True)
@@ -66,7 +72,8 @@ class Nlopt:
         NLopt's own name, such as "LD_CCSAQ".
     bridge
         How a variable on a surface (simplex, elastic net, sphere) is handed over: "auto", as it stands where the
-        algorithm takes equality constraints, else by rays, else by its body; "radial"; or "body".
+        algorithm takes equality constraints, else by squares for quasi-Newton methods and by rays for the others, else
+        by its body; or "radial", "squares", "body".
     inner
         The method that solves the subproblems of LD_AUGLAG: "LD_LBFGS" or "LD_CCSAQ".
     seed
@@ -93,28 +100,29 @@ class Nlopt:
     algorithms: ClassVar[tuple[str, ...]] = tuple(_CAPABILITIES)
 
     def __post_init__(self) -> None:
-        if self.bridge not in _BRIDGES:
-            raise InputError(f"bridge is {self.bridge!r}", remedy=f"choose one of {', '.join(_BRIDGES)}")
+        if self.bridge != "auto" and self.bridge not in _BRIDGES:
+            raise InputError(f"bridge is {self.bridge!r}", remedy=f"choose one of auto, {', '.join(_BRIDGES)}")
         if self.inner not in ("LD_LBFGS", "LD_CCSAQ"):
             raise InputError(f"inner is {self.inner!r}", remedy="choose LD_LBFGS or LD_CCSAQ")
 
     @classmethod
     def default_algorithm(cls, problem: Problem) -> str:
         """Return LD_CCSAQ, which scales best, or LD_AUGLAG where it cannot take the problem."""
-        taken = accept(problem, "LD_CCSAQ", _INEQUALITIES, _BRIDGES["auto"])
-        return "LD_CCSAQ" if not hasattr(taken, "reason") else "LD_AUGLAG"
+        return "LD_AUGLAG" if isinstance(cls("LD_CCSAQ").accepts(problem), Refused) else "LD_CCSAQ"
 
     def accepts(self, problem: Problem) -> Acceptance:
         """Take what the algorithm takes, surfaces through a bridge where it has no equality constraints."""
-        return accept(problem, self.algorithm, _CAPABILITIES[self.algorithm], _BRIDGES[self.bridge])
+        auto = _AUTO_FREE if self.algorithm in _FREE else _AUTO
+        return accept(problem, self.algorithm, _CAPABILITIES[self.algorithm], _BRIDGES.get(self.bridge, auto))
 
     def run(self, oracle: Oracle, start: FloatArray, limits: Limits) -> Raw:
         """Run the algorithm; what NLopt loses when it raises, the oracle has kept."""
-        optimizer = self._optimizer(oracle, limits)
+        start = np.clip(start, oracle.lower, oracle.upper)
+        optimizer = self._optimizer(oracle, start, limits)
         oracle.built()
         nlopt.srand(self.seed)  # the generator is global, so it is set before each run
         try:
-            x = optimizer.optimize(np.clip(start, oracle.lower, oracle.upper))
+            x = optimizer.optimize(start)
         except (nlopt.RoundoffLimited, nlopt.ForcedStop) as stop:
             return Raw(None, type(stop).__name__)
         return Raw(np.asarray(x, float), _words(optimizer.last_optimize_result()))
@@ -124,13 +132,13 @@ class Nlopt:
         """Return the version of NLopt."""
         return {"nlopt": str(nlopt.__version__)}
 
-    def _optimizer(self, oracle: Oracle, limits: Limits) -> Any:
+    def _optimizer(self, oracle: Oracle, start: FloatArray, limits: Limits) -> Any:
         optimizer = _new(self.algorithm, oracle, limits)
         optimizer.set_min_objective(_objective(oracle))
         if self.algorithm == "LD_AUGLAG":
             optimizer.set_local_optimizer(_new(self.inner, oracle, limits))
         for item in oracle.constraints:
-            size = len(item.value_and_jacobian(0.5 * np.ones(oracle.size))[0])
+            size = len(item.value_and_jacobian(start)[0])
             add = (
                 optimizer.add_equality_mconstraint
                 if item.constraint.kind == "equal"
@@ -147,7 +155,9 @@ def _new(algorithm: str, oracle: Oracle, limits: Limits) -> Any:
     # NLopt has no test of stationarity; the change of the objective near a stationary point is its square.
     optimizer.set_ftol_rel(max(1e-3 * limits.tolerance**2, 1e-15))
     optimizer.set_xtol_rel(1e-3 * limits.tolerance)
-    # No set_maxtime: NLopt's clock would count the package's own measurements. The oracle's exception ends every method.
+    if algorithm in ("LD_LBFGS", "LD_VAR1", "LD_VAR2"):
+        optimizer.set_vector_storage(_MEMORY)
+    # No set_maxtime: NLopt's clock would count the package's own measurements; the oracle's exception ends each method.
     return optimizer
 
 
