@@ -101,7 +101,7 @@ class Casadi:
             options["discrete"] = _integral(oracle.problem).tolist()
         solver = ca.nlpsol("solver", plugin, nlp.nlp, options)
         oracle.built()
-        # Bonmin logs each node, and qpoases its licence, through Python's stdout whatever their options say.
+        # Bonmin logs each node through Python's stdout whatever its options say.
         with contextlib.redirect_stdout(io.StringIO()):
             found = solver(
                 x0=np.clip(start, oracle.lower, oracle.upper),

@@ -73,5 +73,4 @@ def is_bound(relation: Relation, x: Any) -> bool:
     jacobian = ca.jacobian(relation.expression, x)
     if ca.depends_on(jacobian, x):
         return False
-    per_row = np.diff(ca.DM(jacobian.sparsity().T(), 1.0).sparsity().colind())
-    return bool((per_row == 1).all())
+    return bool((np.bincount(jacobian.sparsity().row(), minlength=jacobian.shape[0]) == 1).all())

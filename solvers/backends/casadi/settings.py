@@ -9,11 +9,10 @@ import casadi as ca
 from nonrigid.solvers.backends.casadi.transcription import Transcription
 from nonrigid.solvers.limits import Limits
 
-# QP solvers of CasADi that load here, of those that take a dense Hessian: cbc and clp know no quadratic
-# objective, and hpipm wants stages.
-QP_PLUGINS = tuple(
-    name for name in ("qrqp", "osqp", "highs", "qpoases", "daqp", "piqp", "proxqp", "ipqp") if ca.has_conic(name)
-)
+# QP solvers of CasADi that load here. Left out on purpose: highs, whose library, once loaded, keeps highspy from
+# loading in the same process; qpoases, which prints its licence at every solve; cbc, clp, hpipm, which take no such
+# program.
+QP_PLUGINS = tuple(name for name in ("qrqp", "osqp", "daqp", "piqp", "proxqp", "ipqp") if ca.has_conic(name))
 _UNBOUNDED = 10**9  # the solvers' own limits on iterations are lifted: the oracle keeps the limits
 _QUIET = {"print_time": False, "error_on_fail": False, "show_eval_warnings": False}
 
@@ -54,7 +53,7 @@ def _ipopt(limits: Limits, nlp: Transcription, bound_push: float, *, exact: bool
         **dict.fromkeys(("bound_push", "bound_frac", "slack_bound_push", "slack_bound_frac"), bound_push),
     }
     if limits.seconds is not None:
-        options["max_wall_time"] = limits.seconds
+        options["max_wall_time"] = float(limits.seconds)
     if nlp.linear:
         options |= {"jac_c_constant": "yes", "jac_d_constant": "yes"}
     return options
@@ -65,8 +64,6 @@ def _sqp(plugin: str, limits: Limits, memory: int) -> dict[str, Any]:
     quiet: dict[str, dict[str, Any]] = {
         "qrqp": {"print_iter": False, "print_header": False, "print_info": False},
         "osqp": {"osqp": {"verbose": False, "eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 20000}},
-        "highs": {"highs": {"output_flag": False}},
-        "qpoases": {"printLevel": "none"},
         "proxqp": {"proxqp": {"eps_abs": 1e-10, "eps_rel": 0.0, "max_iter": 10000}},
         "ipqp": {"print_iter": False, "print_header": False, "print_info": False},
     }
@@ -95,7 +92,7 @@ def _bonmin(limits: Limits) -> dict[str, Any]:
         "integer_tolerance": 1e-8,
     }
     if limits.seconds is not None:
-        options["time_limit"] = limits.seconds
+        options["time_limit"] = float(limits.seconds)
     return options
 
 
@@ -107,5 +104,5 @@ def _uno(limits: Limits) -> dict[str, Any]:
         "dual_tolerance": 0.1 * limits.tolerance,
     }
     if limits.seconds is not None:
-        options["time_limit"] = limits.seconds
+        options["time_limit"] = float(limits.seconds)
     return options

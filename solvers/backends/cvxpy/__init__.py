@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import version
 from typing import Any, ClassVar
 
@@ -12,7 +13,7 @@ from nonrigid.formulations.model import Problem
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.acceptance import Acceptance, Native, Refused, Via, via
 from nonrigid.solvers.backend import Raw
-from nonrigid.solvers.backends.cvxpy.lowering import Lowered, is_convex, set_obstacle, size_of
+from nonrigid.solvers.backends.cvxpy.lowering import Lowered, is_convex, set_obstacle, size_of, solve_quietly
 from nonrigid.solvers.backends.cvxpy.settings import CONIC, NONLINEAR, QUADRATIC, convex_options, nonlinear_options
 from nonrigid.solvers.backends.cvxpy.successive import successive
 from nonrigid.solvers.bridges.body import ToBody
@@ -57,7 +58,7 @@ class Cvxpy:
         """Take sets whose formulas are known; curved surfaces through their convex bodies."""
         if self.algorithm in NONLINEAR:
             return self._accepts_nonlinear(problem)
-        if self.algorithm not in cp.installed_solvers():
+        if self.algorithm not in _installed():
             return Refused(f"{self.algorithm}: CVXPY does not find it; install {_PACKAGES[self.algorithm]}")
         obstacle = set_obstacle(problem, quadratic=self.algorithm in CONIC)
         if obstacle is not None:
@@ -87,19 +88,19 @@ class Cvxpy:
     def _once(self, program: Any, lowered: Lowered, oracle: Oracle, limits: Limits) -> Raw:
         program.get_problem_data(self.algorithm)
         oracle.built()
-        program.solve(solver=self.algorithm, **convex_options(self.algorithm, limits, limits.seconds))
-        return _answer(program, lowered, oracle)
+        options = convex_options(self.algorithm, limits, limits.seconds)
+        return _answer(solve_quietly(program, solver=self.algorithm, **options), lowered, oracle)
 
     def _nonlinear(self, lowered: Lowered, oracle: Oracle, start: FloatArray, limits: Limits) -> Raw:
         program = cp.Problem(cp.Minimize(lowered.objective()), lowered.constraints)
         lowered.set(start)
         solver = self.algorithm.removeprefix("nlp-")
-        program.solve(nlp=True, solver=solver, **nonlinear_options(self.algorithm, limits))
-        return _answer(program, lowered, oracle)
+        options = nonlinear_options(self.algorithm, limits)
+        return _answer(solve_quietly(program, nlp=True, solver=solver, **options), lowered, oracle)
 
     def _accepts_nonlinear(self, problem: Problem) -> Acceptance:
         solver = self.algorithm.removeprefix("nlp-")
-        if solver not in cp.installed_solvers():
+        if solver not in _installed():
             why = "it needs cyipopt, and casadi:ipopt is the same solver" if solver == "IPOPT" else "install unopy"
             return Refused(f"{self.algorithm}: CVXPY does not find it: {why}")
         for applied in problem.objective.terms:
@@ -114,11 +115,16 @@ class Cvxpy:
         return Native() if obstacle is None else Refused(f"{self.algorithm}: {obstacle}")
 
 
-def _answer(program: Any, lowered: Lowered, oracle: Oracle) -> Raw:
+@cache
+def _installed() -> tuple[str, ...]:
+    return tuple(cp.installed_solvers())
+
+
+def _answer(words: str, lowered: Lowered, oracle: Oracle) -> Raw:
     found = lowered.point()
     if found is not None:
         oracle.observe(found)
-    return Raw(found, str(program.status))
+    return Raw(found, words)
 
 
 BACKEND = Cvxpy

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import cvxpy
@@ -73,6 +74,17 @@ class Lowered:
         offset, jacobian = condition.value_and_jacobian(np.zeros(variable.shape))
         expression = jacobian @ cp.vec(self.variables[variable.name], order="C") + offset
         return expression == 0 if condition.kind == "equal" else expression <= 0
+
+
+def solve_quietly(program: Any, **options: Any) -> str:
+    """Solve a CVXPY program and return its status; a solver that fails is a status, a doubt of CVXPY's no warning."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        try:
+            program.solve(**options)
+        except cp.error.SolverError as failure:
+            return f"solver error: {failure}"
+    return str(program.status)
 
 
 def is_convex(problem: Problem) -> bool:

@@ -21,7 +21,7 @@ def convex_options(algorithm: str, limits: Limits, seconds_left: float | None) -
     options: dict[str, dict[str, Any]] = {
         "CLARABEL": {"tol_gap_abs": gap, "tol_gap_rel": gap, "tol_feas": tight},
         "SCS": {"eps_abs": tight, "eps_rel": tight, "max_iters": _ITERATIONS},
-        "OSQP": {"eps_abs": tight, "eps_rel": tight, "max_iter": _ITERATIONS},
+        "OSQP": {"eps_abs": tight, "eps_rel": tight, "max_iter": _ITERATIONS, "polishing": False},
         "PIQP": {
             "eps_abs": tight,
             "eps_rel": tight,
@@ -34,7 +34,7 @@ def convex_options(algorithm: str, limits: Limits, seconds_left: float | None) -
     chosen = dict(options[algorithm])
     switch = {"CLARABEL": "time_limit", "SCS": "time_limit_secs", "OSQP": "time_limit", "HIGHS": "time_limit"}
     if seconds_left is not None and algorithm in switch:
-        chosen[switch[algorithm]] = max(seconds_left, 1e-3)
+        chosen[switch[algorithm]] = max(float(seconds_left), 1e-3)
     return chosen
 
 
@@ -43,7 +43,7 @@ def nonlinear_options(algorithm: str, limits: Limits) -> dict[str, Any]:
     tight = 0.1 * limits.tolerance
     if algorithm == "nlp-IPOPT":
         options: dict[str, Any] = {"tol": tight, "print_level": 0, "sb": "yes", "bound_push": 1e-8, "bound_frac": 1e-8}
-        return options if limits.seconds is None else options | {"max_wall_time": limits.seconds}
+        return options if limits.seconds is None else options | {"max_wall_time": float(limits.seconds)}
     options = {"preset": "filtersqp", "logger": "SILENT", "primal_tolerance": 0.1 * limits.feasibility}
     options["dual_tolerance"] = tight
-    return options if limits.seconds is None else options | {"time_limit": limits.seconds}
+    return options if limits.seconds is None else options | {"time_limit": float(limits.seconds)}

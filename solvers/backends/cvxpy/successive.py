@@ -10,7 +10,7 @@ import numpy as np
 
 from nonrigid.formulations.model import Applied
 from nonrigid.geometry.arrays import FloatArray
-from nonrigid.solvers.backends.cvxpy.lowering import Lowered, keeps
+from nonrigid.solvers.backends.cvxpy.lowering import Lowered, keeps, solve_quietly
 from nonrigid.solvers.backends.cvxpy.settings import convex_options
 from nonrigid.solvers.judge import restore
 from nonrigid.solvers.limits import Limits
@@ -19,7 +19,8 @@ from nonrigid.solvers.oracle import Oracle
 cp: Any = cvxpy  # its types are incomplete
 
 _GROWTH, _FADE = 4.0, 0.25  # factors of the proximal weight after a step refused, and its least after one accepted
-_PATIENCE = 12  # refused steps in a row after which the inner solver's accuracy is spent
+_LEAST = 1e-3  # least proximal weight, in terms of the first: smaller ones scale the inner problem badly
+_PATIENCE = 8  # refused steps in a row after which the inner solver's accuracy is spent
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +48,7 @@ class _Model:
             if keeps(applied, lowered.sign) and (expression := lowered.term(applied)).is_convex():
                 self.kept.append(applied)
                 objective = objective + self.inverse * expression
+        self.status = "not solved"
         self.program = cp.Problem(cp.Minimize(objective), lowered.constraints)
 
     def compile(self, x: FloatArray) -> None:
@@ -74,9 +76,9 @@ class _Model:
         seconds = self.limits.seconds
         left = None if seconds is None else seconds - self.oracle.seconds
         options = convex_options(self.algorithm, self.limits, left)
-        self.program.solve(solver=self.algorithm, warm_start=True, ignore_dpp=False, **options)
+        self.status = solve_quietly(self.program, solver=self.algorithm, warm_start=True, **options)
         found = self.lowered.point()
-        if found is None or not np.isfinite(found).all():
+        if self.status.startswith("solver error") or found is None or not np.isfinite(found).all():
             return None
         layout = self.lowered.layout
         point = layout.join(restore(self.lowered.problem, layout.split(found)))
@@ -104,20 +106,24 @@ def successive(
     oracle.built()
     value, gradient = oracle.value_and_gradient(x)
     weight = max(float(np.linalg.norm(gradient)), 1e-8)
+    least = _LEAST * weight
     refused = 0
     while True:
         step = model.step(x, gradient, weight)
         if step is None:
-            return x, f"{algorithm}: {model.program.status}"
+            if refused >= _PATIENCE:
+                return x, f"{algorithm}: {model.status}"
+            weight, refused = _GROWTH * weight, refused + 1
+            continue
         length = float(np.linalg.norm(step.d))
         enough = 0.1 * limits.tolerance * max(1.0, abs(value))
         if step.fall <= enough and weight * length <= enough:
-            return x, f"{algorithm}: {model.program.status}; predicted fall {step.fall:.1e}"
+            return x, f"{algorithm}: {model.status}; predicted fall {step.fall:.1e}"
         if refused >= _PATIENCE:
-            return x, f"{algorithm}: {model.program.status}; {refused} steps in a row did not improve"
+            return x, f"{algorithm}: {model.status}; {refused} steps in a row did not improve"
         new_value, new_gradient = oracle.value_and_gradient(step.point)
         if new_value <= value:
-            weight = _after_success(model, x, step, gradient, new_gradient, weight)
+            weight = max(_after_success(model, x, step, gradient, new_gradient, weight), least)
             x, value, gradient, refused = step.point, new_value, new_gradient, 0
         else:
             weight, refused = _GROWTH * weight, refused + 1
