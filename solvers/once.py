@@ -43,8 +43,8 @@ def solve_once(
     raw, failure = _run(backend, oracle, flat, limits)
     seconds, evaluations = oracle.seconds, oracle.evaluations
     judged, error = _measured(problem, rewritten, oracle, raw)
-    failure = failure or oracle.failure or error
-    status, message = _decide(judged, limits, oracle, failure)
+    # A failing term is the cause, what the library then says of it the consequence.
+    status, message = _decide(judged, limits, oracle, oracle.failure or failure or error)
     claims = [bridge.claim for bridge in bridges if bridge.claim is not Claim.EXACT]
     return head.solution(
         status,

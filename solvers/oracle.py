@@ -153,13 +153,11 @@ class Oracle:
         begun = time.perf_counter()
         seconds = self.seconds
         values: Values = self.layout.split(np.array(x, dtype=float))
-        if self._inverse is not None:
-            values = self._inverse(values)
-        off = violation(self.original, values)
-        if off > 1e-12 or objective is None or self._inverse is not None:
-            values = restore(self.original, values)
-            objective = self.original.objective.value(values)
-            off = violation(self.original, values)
+        try:
+            values, objective, off = self._restored(values, objective)
+        except Exception as failure:
+            self.failure = failure
+            raise
         better = self.best is None or self._sign * objective < self._sign * self.best_objective
         kept = better and bool(np.isfinite(objective)) and off <= self.limits.feasibility
         if kept:
@@ -172,6 +170,16 @@ class Oracle:
         self._paused += time.perf_counter() - begun
         if not np.isfinite(objective):
             self._interrupt(NotFiniteError(f"the objective is {objective} at an iterate restored onto its sets"))
+
+    def _restored(self, values: Values, objective: float | None) -> tuple[Values, float, float]:
+        if self._inverse is not None:
+            values = self._inverse(values)
+        off = violation(self.original, values)
+        if off > 1e-12 or objective is None or self._inverse is not None:
+            values = restore(self.original, values)
+            objective = self.original.objective.value(values)
+            off = violation(self.original, values)
+        return values, objective, off
 
     def _interrupt(self, signal: LimitReached | NotFiniteError) -> None:
         # Some libraries swallow exceptions of their callbacks, so the signal is also kept where `solve` sees it.
