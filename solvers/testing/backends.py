@@ -22,7 +22,7 @@ from nonrigid.solvers.testing.errors import ConformanceError, distance, expect
 from nonrigid.solvers.testing.faulty_terms import Failing, NotANumber, Slow
 from nonrigid.solvers.testing.instances import Instance, instances
 
-_BUDGET = Limits(evaluations=1000, seconds=20.0, hard_seconds=40.0)
+_BUDGET = Limits(evaluations=500, seconds=20.0, hard_seconds=40.0)
 
 
 def check_backend(
@@ -36,11 +36,11 @@ def check_backend(
     """Check that a backend keeps its contract, on every small problem that it accepts.
 
     It is a frozen dataclass with names and versions; refusals give a reason; nothing that it accepts is left unsolved:
-    where every stationary point is optimal the answer meets the proved optimum, and nowhere beats it; statuses claim no
-    more than is measured; the claim of its bridges holds; a random start is never left for a worse point; the same
-    start gives the same answer; limits of evaluations and seconds hold; a NaN of the problem ends as
-    `numerical_error`; an exception of the problem ends as `backend_error` with its words. Solves run in child
-    processes, so that a crash or a hang is a finding too.
+    where every stationary point is optimal the answer meets the proved optimum (or, at a limit, has come half of the
+    way), and nowhere beats it; statuses claim no more than is measured; the claim of its bridges holds; a start is
+    never left for a worse point; the same start gives the same answer; limits of evaluations and seconds hold; a NaN of
+    the problem ends as `numerical_error`; an exception of the problem ends as `backend_error` with its words. Solves
+    run in child processes, so that a crash or a hang is a finding too.
 
     Parameters
     ----------
@@ -156,8 +156,10 @@ def _check_answer(
         found=f"{answer.objective:.9g}",
         look="the problem's sets, or the certificate of the instance",
     )
+    begun = sign * (instance.optimum - problem.objective.value(_center(problem))) / max(1.0, abs(instance.optimum))
+    spent = answer.status is Status.LIMIT and short <= 0.5 * begun  # slow is no fault, getting nowhere is
     expect(
-        short <= accuracy or not instance.unimodal,
+        short <= accuracy or spent or not instance.unimodal,
         name,
         expected=f"the optimum {instance.optimum:.9g} ({instance.certificate}), or a refusal",
         found=f"{answer.objective:.9g}, status {answer.status.value}, raw status {answer.raw_status!r}",

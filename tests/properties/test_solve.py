@@ -58,7 +58,12 @@ def test_the_default_start_is_the_center_and_a_given_one_is_used() -> None:
     assert answer.status is Status.STATIONARY
     assert answer.objective == pytest.approx(GAME.optimum)
     assert solve(GAME.problem, Stay(), start=answer).objective == answer.objective
-    assert (answer.raw_status, answer.route, answer.claim, answer.spec) == ("stayed", ("stay:put",), "exact", "stay:put")
+    assert (answer.raw_status, answer.route, answer.claim, answer.spec) == (
+        "stayed",
+        ("stay:put",),
+        "exact",
+        "stay:put",
+    )
     assert answer.attempts == ()
     assert "planted game by stay:put: stationary" in str(answer)
 
@@ -196,7 +201,7 @@ def test_wrong_arguments_are_refused_in_words(arguments: dict[str, Any], words: 
 def test_unknown_names_list_those_that_exist() -> None:
     with pytest.raises(UnknownNameError, match=r"unknown backend 'gurobi'; choose one of: .*native"):
         solve(GAME.problem, "gurobi")
-    with pytest.raises(UnknownNameError, match="unknown algorithm of native 'nope'; choose one of: .*replicator"):
+    with pytest.raises(UnknownNameError, match=r"unknown algorithm of native 'nope'; choose one of: .*replicator"):
         make_backend("native:nope")
     assert "native" in backend_names()
 
