@@ -125,6 +125,12 @@ class Nlopt:
             x = optimizer.optimize(start)
         except (nlopt.RoundoffLimited, nlopt.ForcedStop) as stop:
             return Raw(None, type(stop).__name__)
+        except Exception as failure:
+            if oracle.interrupted is not None:  # some methods replace the oracle's signal by one of their own
+                raise oracle.interrupted from None
+            if not str(failure):
+                raise RuntimeError("NLopt failed without a word, as its line searches do where no step helps") from None
+            raise
         return Raw(np.asarray(x, float), _words(optimizer.last_optimize_result()))
 
     @classmethod

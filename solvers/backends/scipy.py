@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import version
@@ -30,7 +31,10 @@ _CAPABILITIES = {
         because="SLSQP solves a dense least-squares problem a step, 0.2 s at n = 500",
     ),
     "trust-constr": Capability(
-        equal=True, at_most=True, largest=200, because="trust-constr factorises a dense system of all bounds a step, 0.1 s at n = 200"
+        equal=True,
+        at_most=True,
+        largest=200,
+        because="trust-constr factorises a dense system of all bounds a step, 0.1 s at n = 200",
     ),
 }
 _UNBOUNDED = 10**9  # SciPy's own limits on iterations are lifted: the oracle keeps the limits
@@ -76,14 +80,17 @@ class Scipy:
             arguments["constraints"] = [_signed(item, oracle) for item in oracle.constraints]
         oracle.built()
         minimize: Any = scipy.optimize.minimize
-        found = minimize(
-            oracle.value_and_gradient,
-            np.clip(start, oracle.lower, oracle.upper),
-            jac=True,
-            method=self.algorithm,
-            bounds=scipy.optimize.Bounds(oracle.lower, oracle.upper),
-            **arguments,
-        )
+        with warnings.catch_warnings():
+            # A step so small that the slope does not change is how trust-constr ends; it is no news to the user.
+            warnings.filterwarnings("ignore", message="delta_grad == 0.0", category=UserWarning)
+            found = minimize(
+                oracle.value_and_gradient,
+                np.clip(start, oracle.lower, oracle.upper),
+                jac=True,
+                method=self.algorithm,
+                bounds=scipy.optimize.Bounds(oracle.lower, oracle.upper),
+                **arguments,
+            )
         return Raw(np.asarray(found.x, float), f"{found.status}: {found.message}")
 
     @classmethod
