@@ -6,6 +6,7 @@ import pytest
 
 from nonrigid.solvers.acceptance import Refused
 from nonrigid.solvers.backend import backend_class, backend_names
+from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.route import route
 from nonrigid.solvers.testing import check_backend, instances
 
@@ -14,7 +15,7 @@ ALGORITHMS = [f"{name}:{algorithm}" for name in backend_names() for algorithm in
 
 @pytest.mark.parametrize("spec", ALGORITHMS)
 def test_an_algorithm_keeps_its_contract(spec: str) -> None:
-    check_backend(spec)
+    check_backend(spec, limits=Limits(evaluations=150, seconds=10.0, hard_seconds=60.0))
 
 
 @pytest.mark.parametrize("name", backend_names())
