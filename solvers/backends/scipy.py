@@ -28,7 +28,7 @@ _CAPABILITIES = {
         equal=True,
         at_most=True,
         largest=500,
-        because="SLSQP solves a dense least-squares problem a step, 0.2 s at n = 500",
+        because="SLSQP solves a dense least-squares problem a step, about 1 s at n = 500",
     ),
     "trust-constr": Capability(
         equal=True,
