@@ -1,0 +1,1 @@
+"""Which is best, and who says so?"""

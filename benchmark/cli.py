@@ -1,0 +1,78 @@
+"""The command line: `nonrigid match`, `score`, `solvers`, `bench`, `report`, `cite` and `cache`."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import typer
+from typer.core import TyperGroup
+
+from nonrigid.benchmark.commands.cache import cache_command
+from nonrigid.benchmark.commands.match import match_command
+from nonrigid.benchmark.commands.score import score_command
+from nonrigid.benchmark.commands.solvers import solvers_command
+from nonrigid.geometry.errors import NonrigidError
+
+# The exception at the root of what the option parser raises; its module has moved between versions of typer.
+_Complaint: type[Exception] = typer.BadParameter.__mro__[2]
+
+
+class OneLineErrors(TyperGroup):
+    """Report what the user can mend in one line on standard error, with exit code 2 and no traceback."""
+
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = True,
+        windows_expand_args: bool = True,
+        **extra: Any,
+    ) -> Any:
+        """Run a command and leave with its exit code: 0 done, 1 a solve failed or was interrupted, 2 bad input."""
+        try:
+            code = super().main(
+                args=args,
+                prog_name=prog_name,
+                complete_var=complete_var,
+                standalone_mode=False,
+                windows_expand_args=windows_expand_args,
+                **extra,
+            )
+        except (NonrigidError, OSError) as error:
+            code = _complain(str(error))
+        except _Complaint as error:
+            code = _complain(error.format_message())  # type: ignore[attr-defined]
+        except (typer.Abort, KeyboardInterrupt):
+            code = _complain("interrupted; finished runs are kept", code=1)
+        sys.exit(code if isinstance(code, int) else 0)
+
+
+app = typer.Typer(
+    name="nonrigid",
+    cls=OneLineErrors,
+    help="Match parts of deformable surfaces by declarative optimization, with any solver, and score the answers.",
+    no_args_is_help=False,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+app.command("match")(match_command)
+app.command("score")(score_command)
+app.command("solvers")(solvers_command)
+app.command("cache")(cache_command)
+
+
+def main() -> None:
+    """Run the command line with one BLAS thread a process: parallelism is over pairs."""
+    for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(variable, "1")
+    app()
+
+
+def _complain(message: str, code: int = 2) -> int:
+    typer.echo(f"nonrigid: {' '.join(message.split())}", err=True)
+    return code

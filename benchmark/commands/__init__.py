@@ -1,0 +1,1 @@
+"""The commands of `nonrigid`, one module each."""
