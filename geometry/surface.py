@@ -15,13 +15,13 @@ from nonrigid.geometry.clean import CleanMesh, clean
 from nonrigid.geometry.descriptors.heat_kernel import heat_kernel_signature, heat_times
 from nonrigid.geometry.descriptors.shot import shot
 from nonrigid.geometry.descriptors.wave_kernel import wave_energies, wave_kernel_signature
-from nonrigid.geometry.geodesics import make_geodesics
+from nonrigid.geometry.geodesics import Geodesics, make_geodesics
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.operators import Laplacian, laplacian
 from nonrigid.geometry.sampling import canonical_priority, farthest_points
 from nonrigid.geometry.spectrum import Spectrum, spectrum
 
-LARGEST_STORED = 160_000_000
+LARGEST_STORED = 64_000_000
 """Bytes: larger distance matrices are computed again instead of being kept."""
 
 Made = TypeVar("Made")
@@ -158,9 +158,33 @@ class Surface:
         rows: FloatArray = self._remember(content_hash(*key), lambda: self._stored(key, fresh)["rows"])
         return rows if np.array_equal(wanted, ascending) else rows[place]
 
+    def distances_between(self, vertices: ArrayLike, method: str = "dijkstra", *, keep: bool = True) -> FloatArray:
+        """Return the (s, s) distances along the surface between the given vertices, in the unit of the vertices.
+
+        The rows are computed a block at a time, so that memory stays small. `keep=False` says that these vertices will
+        not be asked for again: the answer is then not kept.
+        """
+        wanted = np.asarray(vertices, dtype=np.int64).reshape(-1)
+        ascending, place = np.unique(wanted, return_inverse=True)
+        key = ("between", method, ascending)
+
+        def fresh() -> dict[str, FloatArray]:
+            blocks = np.array_split(ascending, max(1, len(ascending) // 256))
+            made = self._geodesics(method)
+            return {"square": np.vstack([made.distances(block)[:, ascending] for block in blocks])}
+
+        if not keep:
+            square: FloatArray = fresh()["square"]
+        else:
+            square = self._remember(content_hash(*key), lambda: self._stored(key, fresh)["square"])
+        return square if np.array_equal(wanted, ascending) else square[np.ix_(place, place)]
+
     def scaled(self, factor: float) -> Surface:
         """Return the surface with all lengths multiplied by `factor`, with the same cache."""
         return Surface(self.raw.transformed(scale=factor), cache=self._cache)
+
+    def _geodesics(self, method: str) -> Geodesics:
+        return self._remember(f"geodesics {method}", lambda: make_geodesics(self.mesh, method))
 
     def _remember(self, name: str, make: Callable[[], Made]) -> Made:
         if name not in self._made:

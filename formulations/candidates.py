@@ -1,0 +1,103 @@
+"""Candidate matches: for sampled points of the part, the points of the full surface that look alike."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from nonrigid.formulations.formulation import Pair
+from nonrigid.geometry.arrays import BoolArray, FloatArray, IntArray
+from nonrigid.geometry.errors import InputError
+from nonrigid.geometry.maps import nearest_rows
+from nonrigid.geometry.surface import Surface
+
+COSINE_BINS = 10
+"""Values of the cosine in the SHOT descriptors compared here: 320 columns a radius."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Hold possible matches, one a row, in the vertex numbers of the repaired views.
+
+    Parameters
+    ----------
+    part, full
+        (n,) vertex of the part and vertex of the full surface of each candidate.
+    cost
+        (n,) how badly the two fit, each on its own: smaller is better.
+    """
+
+    part: IntArray
+    full: IntArray
+    cost: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.part)
+
+    def __getitem__(self, index: IntArray | BoolArray) -> Candidates:
+        return Candidates(self.part[index], self.full[index], self.cost[index])
+
+    def conflicts(self) -> BoolArray:
+        """(n, n) whether two candidates share a vertex, and so cannot both be true; the diagonal included."""
+        return np.asarray((self.part[:, None] == self.part) | (self.full[:, None] == self.full))
+
+    def in_conflict_with(self, others: Candidates) -> BoolArray:
+        """(n,) whether each candidate shares a vertex with any of `others`."""
+        return np.asarray(np.isin(self.part, others.part) | np.isin(self.full, others.full))
+
+    def one_to_one(self, chosen: IntArray, weight: FloatArray) -> IntArray:
+        """Return places in `chosen` of a conflict-free choice: greedily by falling weight, then by rising cost."""
+        kept, used_part, used_full = [], set(), set()
+        for place in np.lexsort((self.cost[chosen], -weight)):
+            x, y = int(self.part[chosen[place]]), int(self.full[chosen[place]])
+            if x not in used_part and y not in used_full:
+                used_part.add(x)
+                used_full.add(y)
+                kept.append(place)
+        return np.array(kept, dtype=np.int64)
+
+
+def describe(surface: Surface, radii: tuple[float, ...]) -> FloatArray:
+    """Return (n, d) unit rows: SHOT at each radius side by side, radii in units of sqrt(full area)."""
+    rows = np.hstack([surface.shot(radius, cosine_bins=COSINE_BINS) for radius in radii])
+    length = np.linalg.norm(rows, axis=1, keepdims=True)
+    return np.asarray(np.divide(rows, length, out=np.zeros_like(rows), where=length > 0))
+
+
+def candidate_matches(
+    pair: Pair,
+    *,
+    part_samples: int = 300,
+    full_samples: int = 1000,
+    per_sample: int = 10,
+    radii: tuple[float, ...] = (0.04, 0.10),
+) -> Candidates:
+    """Return, for farthest-point samples of the part, the samples of the full surface with the nearest descriptors.
+
+    Parameters
+    ----------
+    part_samples, full_samples
+        Numbers of samples; a surface with fewer vertices gives all of them.
+    per_sample
+        Candidates of each sample of the part.
+    radii
+        Radii of the SHOT descriptors, in units of sqrt(full area).
+
+    Raises
+    ------
+    InputError
+        If a number is below 1.
+
+    Source: pre-selection by descriptor in Rodola, Bronstein, Albarelli, Bergamasco and Torsello (CVPR 2012), with
+    SHOT in place of heat kernels, which parts disturb near their boundary.
+    """
+    for name, value in (("part_samples", part_samples), ("full_samples", full_samples), ("per_sample", per_sample)):
+        if value < 1:
+            raise InputError(f"{name} is {value}", remedy="give a number of at least 1")
+    some = pair.part.samples(min(part_samples, len(pair.part.mesh.vertices)))
+    others = pair.full.samples(min(full_samples, len(pair.full.mesh.vertices)))
+    alike, cost = nearest_rows(
+        describe(pair.part, radii)[some], describe(pair.full, radii)[others], count=min(per_sample, len(others))
+    )
+    return Candidates(np.repeat(some, alike.shape[1]), others[alike.ravel()], cost.ravel())

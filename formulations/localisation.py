@@ -1,0 +1,78 @@
+"""Where a point must lie on the full surface, given anchors that are matched already."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from nonrigid.formulations.candidates import Candidates, describe
+from nonrigid.formulations.formulation import Pair
+from nonrigid.geometry.arrays import FloatArray, IntArray
+
+
+def multilateration_cost(
+    pair: Pair,
+    points: IntArray,
+    anchors: Candidates,
+    *,
+    reach: float,
+    descriptor_weight: float,
+    radii: tuple[float, ...],
+) -> FloatArray:
+    """Return, for vertices of the part and all vertices of the full surface, how badly they fit as a match.
+
+    cost(x, y) = sum_a w_a(x) (d(x, a) - D(y, a'))^2 / sum_a w_a(x) + descriptor_weight |s(x) - S(y)|^2 with weights
+    w_a(x) = exp(-(d(x, a) / reach)^2): near anchors count most, because long distances are those a cut disturbs.
+
+    Parameters
+    ----------
+    points
+        (p,) vertices of the part.
+    anchors
+        Matches taken to be true.
+    reach
+        Distance at which an anchor counts 1/e, in units of sqrt(full area).
+    descriptor_weight
+        Weight of the squared difference of unit SHOT rows (0 to 4) against squared lengths.
+
+    Returns
+    -------
+    (p, n_full), in units of the full area.
+    """
+    on_part = pair.part.distances(anchors.part)[:, points]
+    on_full = pair.full.distances(anchors.full)
+    weight = np.exp(-np.square((on_part - on_part.min(axis=0)) / reach))
+    weight /= weight.sum(axis=0)
+    cost = (weight * on_part**2).sum(axis=0)[:, None] - 2.0 * (weight * on_part).T @ on_full + weight.T @ on_full**2
+    rows, columns = describe(pair.part, radii)[points], describe(pair.full, radii)
+    cost += descriptor_weight * (2.0 - 2.0 * rows @ columns.T)
+    return np.asarray(cost)
+
+
+def local_matches(
+    pair: Pair,
+    points: IntArray,
+    anchors: Candidates,
+    *,
+    count: int,
+    farthest: float,
+    radii: tuple[float, ...],
+    reach: float = 0.25,
+    descriptor_weight: float = 0.02,
+) -> Candidates:
+    """Return, for points of the part near an anchor, the `count` vertices of the full surface that fit best.
+
+    Parameters
+    ----------
+    points
+        (p,) vertices of the part.
+    farthest
+        Points farther than this from every anchor are left out, in units of sqrt(full area).
+    reach, descriptor_weight, radii
+        See `multilateration_cost`.
+    """
+    near = pair.part.distances(anchors.part)[:, points].min(axis=0) <= farthest
+    points = points[near]
+    cost = multilateration_cost(pair, points, anchors, reach=reach, descriptor_weight=descriptor_weight, radii=radii)
+    count = min(count, cost.shape[1])
+    best = np.sort(np.argpartition(cost, count - 1, axis=1)[:, :count], axis=1)
+    return Candidates(np.repeat(points, count), best.ravel(), np.take_along_axis(cost, best, axis=1).ravel())
