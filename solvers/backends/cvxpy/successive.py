@@ -111,6 +111,7 @@ def successive(
     while True:
         step = model.step(x, gradient, weight)
         if step is None:
+            oracle.charge(0.0)  # raises where it was the clock that stopped the inner solver
             if refused >= _PATIENCE:
                 return x, f"{algorithm}: {model.status}"
             weight, refused = _GROWTH * weight, refused + 1
