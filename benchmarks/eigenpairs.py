@@ -1,6 +1,8 @@
 """Time 100 eigenpairs of a surface against pyFM's `process` on the same mesh.
 
-Usage: python benchmarks/eigenpairs.py [mesh]. Expect a ratio of at least 1.3 and equal eigenvalues.
+Usage: python benchmarks/eigenpairs.py [mesh]. Expect equal eigenvalues, and a ratio of at least 1.3 on surfaces with limbs
+(the templates of SHREC'16); on the bumpy sphere it is about 1.1, because the factor of a sphere is twice as full and what
+remains is ARPACK's own work, which both do.
 """
 
 from __future__ import annotations
@@ -11,17 +13,18 @@ from time import process_time
 import numpy as np
 from bumpy_sphere import mesh_from_arguments
 from pyFM.mesh import TriMesh
+from threadpoolctl import threadpool_limits
 
 from nonrigid.geometry.clean import clean
 from nonrigid.geometry.operators import laplacian
 from nonrigid.geometry.spectrum import spectrum
 
 PAIRS = 100
-ROUNDS = 3
+ROUNDS = 5
 
 
 def main() -> None:
-    """Write a table of CPU seconds, the best of three interleaved rounds."""
+    """Write a table of CPU seconds, the best of five interleaved rounds."""
     mesh = clean(mesh_from_arguments()).mesh
     mesh = mesh.transformed(scale=1.0 / np.sqrt(mesh.area))  # pyFM's shift suits unit area
     write = sys.stdout.write
@@ -41,4 +44,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with threadpool_limits(1):  # CPU seconds of waiting threads would count
+        main()

@@ -12,6 +12,7 @@ from time import process_time
 import numpy as np
 from bumpy_sphere import mesh_from_arguments
 from scipy.spatial import cKDTree
+from threadpoolctl import threadpool_limits
 
 from nonrigid.geometry.clean import clean
 from nonrigid.geometry.maps import nearest_rows
@@ -49,4 +50,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    with threadpool_limits(1):  # CPU seconds of waiting threads would count
+        main()

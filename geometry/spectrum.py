@@ -52,8 +52,8 @@ def spectrum(laplacian: Laplacian, k: int, *, reference: FloatArray | None = Non
     Signs: each eigenfunction takes the sign that makes its third moment, the sum of m_i phi_i^3, positive, which
     depends neither on the order of the vertices nor on the frame. Where the third moment vanishes up to rounding (an
     eigenfunction that is odd under a symmetry of the surface: no intrinsic rule can choose) the sum of m_i phi_i r_i is
-    made positive for the (n,) function r = `reference`, if one is given; else the solver's sign stays. Eigenfunctions of
-    a repeated eigenvalue are defined up to a rotation among themselves.
+    made positive for the (n,) function r = `reference`, if one is given; else the solver's sign stays. Eigenfunctions
+    of a repeated eigenvalue are defined up to a rotation among themselves.
 
     Raises
     ------
