@@ -15,7 +15,7 @@ _ITERATIONS = 100_000
 
 def convex_options(algorithm: str, limits: Limits, seconds_left: float | None) -> dict[str, Any]:
     """Return the options of one convex solve; PIQP knows no time limit."""
-    tight = min(1e-3 * limits.tolerance, 1e-2 * limits.feasibility)
+    tight = max(min(1e-3 * limits.tolerance, 1e-2 * limits.feasibility), 1e-10)
     # A gap e of a strongly convex model leaves an error of sqrt(e) in its minimizer.
     gap = max(tight**2, 1e-13)
     options: dict[str, dict[str, Any]] = {
