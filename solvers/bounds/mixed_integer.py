@@ -47,7 +47,8 @@ class MixedInteger:
         scale = max(1.0, float(np.abs(B).max()))
         rows = _rows(B, top)
         n = len(B)
-        low = np.concatenate([np.zeros(2 * n), [start.known - 1e-6 * scale]])
+        # The level is known to be at least `known`; a range as narrow as its tolerances would be collapsed by HiGHS.
+        low = np.concatenate([np.zeros(2 * n), [start.known - 0.01 * scale]])
         high = np.concatenate([np.ones(2 * n), [top]])
         answer = milp(
             np.concatenate([np.zeros(2 * n), [-1.0]]),
@@ -57,7 +58,8 @@ class MixedInteger:
             options={"time_limit": max(seconds - (time.perf_counter() - begun), 0.01), "mip_rel_gap": 1e-7},
         )
         dual = getattr(answer, "mip_dual_bound", None)
-        value = top if dual is None or not np.isfinite(dual) else min(-float(dual) + 5e-7 * scale, top)
+        proved = top if dual is None or not np.isfinite(dual) else max(-float(dual), start.known)
+        value = min(proved + 5e-7 * scale, top)
         detail = f"{n} of {len(game.matrix)} strategies; HiGHS: {answer.message}"
         return Bound(game.objective(value), "mixed_integer", time.perf_counter() - begun, detail)
 
