@@ -46,15 +46,19 @@ class Candidates:
         """(n,) whether each candidate shares a vertex with any of `others`."""
         return np.asarray(np.isin(self.part, others.part) | np.isin(self.full, others.full))
 
-    def one_to_one(self, chosen: IntArray, weight: FloatArray) -> IntArray:
-        """Return places in `chosen` of a conflict-free choice: greedily by falling weight, then by rising cost."""
-        kept, used_part, used_full = [], set(), set()
-        for place in np.lexsort((self.cost[chosen], -weight)):
-            x, y = int(self.part[chosen[place]]), int(self.full[chosen[place]])
+    def greedy(self, weight: FloatArray, *, floor: float = 1e-3) -> IntArray:
+        """Return a conflict-free choice: by falling weight, then rising cost, down to `floor` of the largest weight."""
+        kept: list[int] = []
+        used_part: set[int] = set()
+        used_full: set[int] = set()
+        for index in np.lexsort((self.cost, -weight)):
+            if weight[index] <= floor * weight.max():
+                break
+            x, y = int(self.part[index]), int(self.full[index])
             if x not in used_part and y not in used_full:
                 used_part.add(x)
                 used_full.add(y)
-                kept.append(place)
+                kept.append(int(index))
         return np.array(kept, dtype=np.int64)
 
 

@@ -112,7 +112,7 @@ class Correspondence:
         return cls(raw, points[first], sure[first])
 
     def dense(self, vertex_count: int) -> SurfacePoints:
-        """Return one point for each of the part's vertices, unmatched where there is none: the form of a `.corr` file."""
+        """Return one point for each vertex of the part, unmatched where there is none: the form of a `.corr` file."""
         faces, weights = np.full(vertex_count, -1, dtype=np.int64), np.zeros((vertex_count, 3))
         faces[self.part_vertices], weights[self.part_vertices] = self.points.faces, self.points.barycentric
         return SurfacePoints(faces, weights)

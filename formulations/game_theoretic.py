@@ -85,25 +85,27 @@ class GameTheoretic:
             per_sample=self.per_sample,
             radii=self.radii,
         )
-        chosen, share = yield from self._play("game", pair, matches)
+        share = yield from self._play("game", pair, matches, groups=self.groups)
         if self.local_candidates:
             matches = local_matches(
                 pair,
                 np.unique(matches.part),
-                matches[chosen],
+                matches[share > 0.0],
                 count=self.local_candidates,
                 farthest=self.local_reach,
                 radii=self.radii,
             )
-            chosen, share = yield from self._play("local", pair, matches)
-        kept = matches.one_to_one(chosen, share)
-        found = matches[chosen[kept]]
-        return Correspondence.between_vertices(pair, found.part, found.full, share[kept] / share.max())
+            share = yield from self._play("local", pair, matches, groups=1)
+        kept = matches.greedy(share)
+        return Correspondence.between_vertices(pair, matches.part[kept], matches.full[kept], share[kept] / share.max())
 
     def _play(
-        self, name: str, pair: Pair, matches: Candidates
-    ) -> Generator[Problem, Solved, tuple[IntArray, FloatArray]]:
-        """Solve the game, set its survivors and what conflicts with them aside, solve the rest, and merge the groups."""
+        self, name: str, pair: Pair, matches: Candidates, *, groups: int
+    ) -> Generator[Problem, Solved, FloatArray]:
+        """Solve a game, set its survivors and their rivals aside, solve the rest, and so on; merge what agrees.
+
+        Return the share of each candidate in the winning coalition.
+        """
         payoff = consistency(
             pair,
             matches,
@@ -112,22 +114,22 @@ class GameTheoretic:
             excess_weight=self.excess_weight,
             keep=name == "game",
         )
-        groups: list[tuple[IntArray, FloatArray]] = []
+        found: list[tuple[IntArray, FloatArray]] = []
         rest = np.arange(len(matches))
         best = 0.0
-        while len(groups) < self.groups and len(rest) > 1:
-            solution = yield _game(name, payoff if not groups else payoff[np.ix_(rest, rest)])
+        while len(found) < groups and len(rest) > 1:
+            solution = yield _game(name, payoff if not found else payoff[np.ix_(rest, rest)])
             members, share = _survivors(solution["u"])
             quality = solution.objective / (1.0 - 1.0 / max(len(members), 2))
-            if groups and quality < self.group_quality * best:
+            if found and quality < self.group_quality * best:
                 break
             best = max(best, quality)
-            groups.append((rest[members], share))
+            found.append((rest[members], share))
             rest = rest[~matches[rest].in_conflict_with(matches[rest[members]])]
-        return self._merge(payoff, groups)
+        return self._merge(payoff, found)
 
-    def _merge(self, payoff: FloatArray, groups: list[tuple[IntArray, FloatArray]]) -> tuple[IntArray, FloatArray]:
-        """Return the union of the coalition of agreeing groups that earns most in total, over all its pairs of matches."""
+    def _merge(self, payoff: FloatArray, groups: list[tuple[IntArray, FloatArray]]) -> FloatArray:
+        """Return the shares in the coalition of agreeing groups that earns most over all its pairs of matches."""
         mean = np.array([[payoff[np.ix_(a, b)].mean() for b, _ in groups] for a, _ in groups])
         size = np.array([len(members) for members, _ in groups], dtype=float)
 
@@ -140,8 +142,10 @@ class GameTheoretic:
 
         every = [c for count in range(1, len(groups) + 1) for c in combinations(range(len(groups)), count)]
         winner = max(every, key=worth)
-        members = np.concatenate([groups[index][0] for index in winner])
-        return members, np.concatenate([groups[index][1] for index in winner])
+        shares = np.zeros(len(payoff))
+        for members, share in (groups[index] for index in winner):
+            shares[members] = share
+        return shares
 
 
 def _game(name: str, payoff: FloatArray) -> Problem:
