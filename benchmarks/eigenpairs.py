@@ -1,8 +1,8 @@
 """Time 100 eigenpairs of a surface against pyFM's `process` on the same mesh.
 
-Usage: python benchmarks/eigenpairs.py [mesh]. Expect equal eigenvalues, and a ratio of at least 1.3 on surfaces with limbs
-(the templates of SHREC'16); on the bumpy sphere it is about 1.1, because the factor of a sphere is twice as full and what
-remains is ARPACK's own work, which both do.
+Usage: python benchmarks/eigenpairs.py [mesh]. Expect equal eigenvalues, and a ratio of at least 1.3 on surfaces with
+limbs (the templates of SHREC'16); on the bumpy sphere it is about 1.1, because the factor of a sphere is twice as full
+and what remains is ARPACK's own work, which both do.
 """
 
 from __future__ import annotations
