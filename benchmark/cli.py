@@ -10,8 +10,10 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+from nonrigid.benchmark.commands.bench import bench_command
 from nonrigid.benchmark.commands.cache import cache_command
 from nonrigid.benchmark.commands.match import match_command
+from nonrigid.benchmark.commands.report import report_command
 from nonrigid.benchmark.commands.score import score_command
 from nonrigid.benchmark.commands.solvers import solvers_command
 from nonrigid.geometry.errors import NonrigidError
@@ -63,6 +65,8 @@ app = typer.Typer(
 app.command("match")(match_command)
 app.command("score")(score_command)
 app.command("solvers")(solvers_command)
+app.command("bench")(bench_command)
+app.command("report")(report_command)
 app.command("cache")(cache_command)
 
 

@@ -1,0 +1,211 @@
+"""Do one run of a benchmark: match one pair by one method and backend, and score the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from importlib.metadata import version
+
+import joblib
+import numpy as np
+
+from nonrigid.benchmark.choices import backend_words, guarded, parse_backend
+from nonrigid.benchmark.datasets.protocols import PairData
+from nonrigid.benchmark.environment import source_digest
+from nonrigid.benchmark.formats import write_corr
+from nonrigid.benchmark.protocol import score
+from nonrigid.benchmark.store import Record, Store
+from nonrigid.formulations.formulation import Formulation, Pair, Stages
+from nonrigid.formulations.model import Problem
+from nonrigid.geometry.cache import content_hash
+from nonrigid.geometry.errors import NonrigidError
+from nonrigid.geometry.points import SurfacePoints
+from nonrigid.solvers.backend import backend_class
+from nonrigid.solvers.limits import Limits
+from nonrigid.solvers.match import match
+from nonrigid.solvers.solution import Solution
+
+TRACE_POINTS = 100
+"""Points of a solver's trace that are kept, evenly chosen."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Run:
+    """Hold one row of a plan: everything that a run depends on but the pair's meshes."""
+
+    pair: str
+    split: str
+    class_name: str
+    label: str
+    method: str
+    formulation: Formulation
+    backend: str
+    starts: int
+    seed: int
+    motion_seed: int | None
+    metric: str
+    limits: Limits
+    data_hash: str
+
+    @property
+    def id(self) -> str:
+        """Hash of the row, the meshes and the versions; the label does not count."""
+        choice = parse_backend(self.backend)
+        names = sorted({word.partition(":")[0] for word in backend_words(choice)})
+        versions = [f"{name} {sorted(backend_class(name).versions().items())}" for name in names]
+        return content_hash(
+            version("nonrigid"),
+            *versions,
+            self.pair,
+            repr(self.formulation),
+            self.backend,
+            self.starts,
+            self.seed,
+            self.motion_seed,
+            self.metric,
+            repr(self.limits),
+            self.data_hash,
+        )[:20]
+
+
+def do_run(run: Run, data: PairData, pair: Pair, store: Store) -> Record:
+    """Match, score, and write correspondence and record. What a method or backend raises becomes the row's message.
+
+    `pair` holds the moved part; scores are taken on `data`, where the ground truth is.
+    """
+    choice = parse_backend(run.backend)
+    observed = Observed(run.formulation)
+    record = _head(run)
+    try:
+        found = match(pair, observed, choice, starts=run.starts, seed=run.seed, limits=guarded(run.limits, choice))
+        record |= {
+            "status": found.status.value,
+            "message": found.message,
+            "build_seconds": found.build_seconds,
+            "solve_seconds": found.solve_seconds,
+            "formulation_seconds": found.formulation_seconds,
+            "evaluations": float(sum(solution.evaluations for solution in found.solutions)),
+            "stages": [_stage(*both) for both in zip(found.solutions, observed.seen, strict=True)],
+        }
+        if found.solutions:
+            first: Mapping[str, object] = record["stages"][0]
+            names = ("problem", "problem_hash", "sense", "solver", "variables")
+            record |= {name: first[name] for name in (*names, "objective", "violation", "stationarity", "bound")}
+        if found.correspondence is not None:
+            points = found.correspondence.dense(len(data.part.vertices))
+            write_corr(store.match_file(run.id), points)
+            if data.truth is not None:
+                record |= _scored(data, points, run.metric)
+    except Exception as failure:
+        # A method or library of a third party may raise anything; the row says so, and the benchmark goes on.
+        record |= _failed(failure)
+    return _write(record, store)
+
+
+def write_failure(run: Run, failure: Exception, store: Store) -> Record:
+    """Write the record of a run that could not even start."""
+    return _write(_head(run) | _failed(failure), store)
+
+
+@dataclass
+class Observed:
+    """Stand for a formulation, and note the size and the hash of every problem that it states."""
+
+    formulation: Formulation
+    seen: list[tuple[int, str | None]] = field(default_factory=list)
+
+    def stages(self, pair: Pair) -> Stages:
+        """State the formulation's problems, unchanged."""
+        stages = self.formulation.stages(pair)
+        try:
+            problem = next(stages)
+            while True:
+                self.seen.append((sum(variable.size for variable in problem.variables), problem_hash(problem)))
+                solution = yield problem
+                problem = stages.send(solution)
+        except StopIteration as end:
+            return end.value  # type: ignore[no-any-return]
+
+
+def problem_hash(problem: Problem) -> str | None:
+    """Return a hash of a problem's data; None where a term holds something that has no stable content, as a lambda."""
+    try:
+        digest = joblib.hash((problem.objective, problem.memberships, dict(problem.constraints)), hash_name="sha1")
+    except Exception:  # whatever pickling a third party's term raises
+        return None
+    return str(digest)
+
+
+def _failed(failure: Exception) -> Record:
+    words = str(failure) if isinstance(failure, NonrigidError) else f"{type(failure).__name__}: {failure}"
+    return {"status": "error", "message": " ".join(words.split())}
+
+
+def _write(record: Record, store: Store) -> Record:
+    record["finished"] = datetime.now(UTC).isoformat(timespec="seconds")
+    store.write_run(record)
+    return record
+
+
+def _head(run: Run) -> Record:
+    return {
+        "id": run.id,
+        "pair": run.pair,
+        "split": run.split,
+        "class_name": run.class_name,
+        "label": run.label,
+        "method": run.method,
+        "settings": repr(run.formulation),
+        "backend": run.backend,
+        "starts": run.starts,
+        "seed": run.seed,
+        "motion_seed": run.motion_seed,
+        "metric": run.metric,
+        "limits": repr(run.limits),
+        "source": source_digest(),
+        "stages": [],
+    }
+
+
+def _stage(solution: Solution, seen: tuple[int, str | None]) -> Record:
+    variables, digest = seen
+    step = max(1, -(-len(solution.trace) // TRACE_POINTS))
+    return {
+        "problem": solution.problem,
+        "problem_hash": digest,
+        "variables": variables,
+        "sense": solution.sense.value,
+        "solver": solution.spec,
+        "status": solution.status.value,
+        "usable": solution.status.usable,
+        "message": solution.message,
+        "raw_status": solution.raw_status,
+        "route": list(solution.route),
+        "claim": solution.claim,
+        "objective": solution.objective,
+        "violation": solution.violation,
+        "stationarity": solution.stationarity,
+        "bound": None if solution.bound is None else solution.bound.value,
+        "certificate": solution.certificate,
+        "build_seconds": solution.build_seconds,
+        "solve_seconds": solution.solve_seconds,
+        "evaluations": solution.evaluations,
+        "versions": dict(solution.versions),
+        "attempts": [{**vars(attempt), "status": attempt.status.value} for attempt in solution.attempts],
+        "trace": [[p.seconds, p.evaluations, p.objective, p.violation] for p in solution.trace[::step]],
+    }
+
+
+def _scored(data: PairData, points: SurfacePoints, metric: str) -> Record:
+    result = score(data, points, geodesics=metric)
+    return {
+        "mean_error": result.mean_error,
+        "mean_error_per_point": result.mean_error_per_point,
+        "side": result.side,
+        "match_count": result.match_count,
+        "unmatched_count": result.unmatched_count,
+        "coverage": result.coverage,
+        "kept_area": result.kept_area,
+        "curve": np.asarray(result.curve).tolist(),
+    }
