@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nonrigid.formulations.model import Problem
+from nonrigid.formulations.model.binary_sets import integral_entries
 from nonrigid.solvers.acceptance import Acceptance, Bridge, Native, Refused, Via, via
 from nonrigid.solvers.layout import Layout
 
@@ -39,6 +40,9 @@ class Capability:
         layout = Layout(problem)
         if self.largest is not None and layout.size > self.largest:
             return f"{self.because}: {layout.size} unknowns, at most {self.largest} work"
+        whole = sum(int(integral_entries(m.set, m.variable.shape).sum()) for m in problem.memberships)
+        if whole:
+            return f"it takes no integers, and {whole} unknowns are; bridge or use a mixed-integer solver"
         takes = {"equal": self.equal, "at most": self.at_most}
         words = {"equal": "equality", "at most": "inequality"}
         for item in layout.constraints():

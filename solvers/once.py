@@ -134,9 +134,10 @@ def _measured(
             oracle.interrupted = oracle.interrupted or NotFiniteError(f"the objective is {found[-1].objective}")
         return None, failure
     sign = 1.0 if problem.objective.sense is Sense.MINIMIZE else -1.0
-    # The last point is preferred to an equally good one seen on the way: it is the more stationary of the two.
+    # The last point is preferred to one seen on the way that is better by less than what was asked for: it is the more
+    # stationary of the two.
     final, first, allowed = finite[-1], finite[0], oracle.limits.feasibility
-    margin = 1e-9 * max(1.0, abs(final.objective))
+    margin = oracle.limits.tolerance * max(1.0, abs(final.objective))
     if first.violation <= allowed:
         worse = final.violation > allowed or sign * first.objective < sign * final.objective - margin
         return (first if worse else final), failure

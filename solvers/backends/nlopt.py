@@ -120,6 +120,7 @@ class Nlopt:
         start = np.clip(start, oracle.lower, oracle.upper)
         optimizer = self._optimizer(oracle, start, limits)
         oracle.built()
+        oracle.observe(start)  # random searches need not visit their start, which may be the only feasible point seen
         nlopt.srand(self.seed)  # the generator is global, so it is set before each run
         try:
             x = optimizer.optimize(start)

@@ -12,7 +12,7 @@ from nonrigid.solvers.limits import Limits
 # QP solvers of CasADi that load here. Left out on purpose: highs, whose library, once loaded, keeps highspy from
 # loading in the same process; qpoases, which prints its licence at every solve; cbc, clp, hpipm, which take no such
 # program.
-QP_PLUGINS = tuple(name for name in ("qrqp", "osqp", "daqp", "piqp", "proxqp", "ipqp") if ca.has_conic(name))
+QP_PLUGINS = tuple(name for name in ("qrqp", "osqp", "daqp", "piqp", "proxqp") if ca.has_conic(name))
 _UNBOUNDED = 10**9  # the solvers' own limits on iterations are lifted: the oracle keeps the limits
 _QUIET = {"print_time": False, "error_on_fail": False, "show_eval_warnings": False}
 
@@ -65,7 +65,6 @@ def _sqp(plugin: str, limits: Limits, memory: int) -> dict[str, Any]:
         "qrqp": {"print_iter": False, "print_header": False, "print_info": False},
         "osqp": {"osqp": {"verbose": False, "eps_abs": 1e-9, "eps_rel": 1e-9, "max_iter": 20000}},
         "proxqp": {"proxqp": {"eps_abs": 1e-10, "eps_rel": 0.0, "max_iter": 10000}},
-        "ipqp": {"print_iter": False, "print_header": False, "print_info": False},
     }
     return {
         "qpsol": plugin,
