@@ -9,11 +9,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from nonrigid.formulations.candidates import Candidates, candidate_matches
-from nonrigid.formulations.distortion import Sides, consistency
-from nonrigid.formulations.formulation import Correspondence, Pair, Solved, Stages
-from nonrigid.formulations.localisation import local_matches
-from nonrigid.formulations.model import Problem, QuadraticForm, Simplex, Variable, maximize
+from nonrigid.formulations.candidates import Candidates
+from nonrigid.formulations.distortion import Sides
+from nonrigid.formulations.formulation import Pair, Solved, Stages
+from nonrigid.formulations.games import game, local_players, payoffs, players, read_out
+from nonrigid.formulations.model import Problem, Simplex
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.errors import InputError
 
@@ -78,26 +78,12 @@ class GameTheoretic:
         """State the game (once a peeled group), then the local game; return one match a surviving sample."""
         if self.groups < 1:
             raise InputError(f"groups is {self.groups}", remedy="peel at least one group")
-        matches = candidate_matches(
-            pair,
-            part_samples=self.part_samples,
-            full_samples=self.full_samples,
-            per_sample=self.per_sample,
-            radii=self.radii,
-        )
+        matches = players(self, pair)
         share = yield from self._play("game", pair, matches, groups=self.groups)
         if self.local_candidates:
-            matches = local_matches(
-                pair,
-                np.unique(matches.part),
-                matches[share > 0.0],
-                count=self.local_candidates,
-                farthest=self.local_reach,
-                radii=self.radii,
-            )
+            matches = local_players(self, pair, matches, matches[share > 0.0])
             share = yield from self._play("local", pair, matches, groups=1)
-        kept = matches.greedy(share)
-        return Correspondence.between_vertices(pair, matches.part[kept], matches.full[kept], share[kept] / share.max())
+        return read_out(pair, matches, share, floor=NEGLIGIBLE)
 
     def _play(
         self, name: str, pair: Pair, matches: Candidates, *, groups: int
@@ -106,19 +92,12 @@ class GameTheoretic:
 
         Return the share of each candidate in the winning coalition.
         """
-        payoff = consistency(
-            pair,
-            matches,
-            kernel_width=self.kernel_width,
-            sides=self.sides,
-            excess_weight=self.excess_weight,
-            keep=name == "game",
-        )
+        payoff = payoffs(self, pair, matches, keep=name == "game")
         found: list[tuple[IntArray, FloatArray]] = []
         rest = np.arange(len(matches))
         best = 0.0
         while len(found) < groups and len(rest) > 1:
-            solution = yield _game(name, payoff if not found else payoff[np.ix_(rest, rest)])
+            solution = yield game(name, payoff if not found else payoff[np.ix_(rest, rest)], Simplex())
             members, share = _survivors(solution["u"])
             quality = solution.objective / (1.0 - 1.0 / max(len(members), 2))
             if found and quality < self.group_quality * best:
@@ -146,11 +125,6 @@ class GameTheoretic:
         for members, share in (groups[index] for index in winner):
             shares[members] = share
         return shares
-
-
-def _game(name: str, payoff: FloatArray) -> Problem:
-    u = Variable("u", len(payoff))
-    return Problem(name, maximize(QuadraticForm(payoff)(u)), u @ Simplex())
 
 
 def _survivors(u: FloatArray) -> tuple[IntArray, FloatArray]:
