@@ -59,10 +59,11 @@ def run_plan(plan: Plan, out: Path, *, jobs: int = 1, fresh: bool = False, quiet
     store.prepare()
     pairs = plan.pairs()
     runs = {spec.name: plan_runs(plan, spec) for spec in pairs}
-    ids = [run.id for members in runs.values() for run in members]
+    labels = {run.id: run.label for members in runs.values() for run in members}
+    ids = list(labels)
     write_text(out / "plan.toml", plan.text)
     write_text(out / "environment.json", json_text({**environment(), "jobs": jobs}) + "\n")
-    store.write_index({"title": plan.title, "dataset": plan.data_word, "metric": plan.metric, "runs": ids})
+    store.write_index({"title": plan.title, "dataset": plan.data_word, "metric": plan.metric, "runs": labels})
     done = set() if fresh else store.finished(ids)
     for run in set(ids) - done:
         (store.runs / f"{run}.json").unlink(missing_ok=True)

@@ -100,7 +100,8 @@ class Store:
 
     def records(self) -> list[Record]:
         """Return the finished runs of the plan, in its order, with the gap of each to the best known objective."""
-        found = [_read(self.runs / f"{run}.json") for run in self.index()["runs"] if self.has(run)]
+        labels: dict[str, str] = self.index()["runs"]
+        found = [{**_read(self.runs / f"{run}.json"), "label": label} for run, label in labels.items() if self.has(run)]
         return with_gaps(found)
 
     def write_table(self, records: list[Record]) -> Path:
@@ -155,7 +156,7 @@ def _gap(stage: Record, best: Mapping[str, float]) -> float | None:
     if not _comparable(stage):
         return None
     top = best[stage["problem_hash"]]
-    relative: float = round(abs(top - stage["objective"]) / max(abs(top), 1e-12), 15)
+    relative: float = round(abs(top - stage["objective"]) / max(abs(top), 1e-12), 12)
     return relative
 
 

@@ -103,7 +103,10 @@ def _scatter(figure: Figure, series: dict[str, list[Record]], theme: str) -> Non
         seconds = np.array([record["solve_seconds"] for record in records])
         errors = 100 * np.array([record["mean_error"] for record in records])
         x, y = seconds.mean(), errors.mean()
-        spans = [np.abs(np.percentile(values, [25, 75]) - centre) for values, centre in ((seconds, x), (errors, y))]
+        # The mean of skewed values can lie outside the quartiles; that side then has no bar.
+        spans = [
+            np.maximum([c - np.percentile(v, 25), np.percentile(v, 75) - c], 0) for v, c in ((seconds, x), (errors, y))
+        ]
         look = {"color": _look(index)["color"], "marker": _MARKERS[index % len(_MARKERS)]}
         axes.errorbar(
             x,

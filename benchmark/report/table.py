@@ -28,8 +28,11 @@ COLUMNS: Mapping[str, str] = {
 }
 """Keys of a summary row and their headings."""
 
-BRIEF = tuple(key for key in COLUMNS if key not in ("method", "split", "mean_error_per_point_x100", "coverage"))
-"""Keys that fit a terminal."""
+WIDE = tuple(key for key in COLUMNS if key not in ("method", "split"))
+"""Keys of a table of one method over all pairs."""
+
+BRIEF = tuple(key for key in WIDE if key not in ("mean_error_per_point_x100", "coverage"))
+"""Those that fit a terminal."""
 
 EXPLAINED: Mapping[str, str] = {
     "pairs": "pairs with a match, of all pairs",
@@ -76,15 +79,17 @@ def summary(records: Sequence[Record], *, by_split: bool = True) -> list[dict[st
     return rows
 
 
-def brief(rows: Sequence[Mapping[str, object]]) -> dict[str, tuple[list[dict[str, object]], dict[str, str]]]:
-    """Return for each method a table for the terminal, a row a backend, and its columns: errors by split beside all."""
+def by_method(
+    rows: Sequence[Mapping[str, object]], keys: Sequence[str]
+) -> dict[str, tuple[list[dict[str, object]], dict[str, str]]]:
+    """Return for each method a table of these keys, a row a backend, and its columns: errors by split beside all."""
     tables = {}
     for label in dict.fromkeys(str(row["method"]) for row in rows):
         mine = [row for row in rows if row["method"] == label]
         splits = [split for split in dict.fromkeys(str(row["split"]) for row in mine) if split != "all"]
         error = {(row["backend"], row["split"]): row["mean_error_x100"] for row in mine}
         columns: dict[str, str] = {}
-        for key in BRIEF:
+        for key in keys:
             columns[key] = COLUMNS[key]
             if key == "mean_error_x100":
                 columns |= {f"error {split}": split for split in splits}
@@ -151,7 +156,7 @@ def notes(index: Mapping[str, object], records: Sequence[Record]) -> list[str]:
     """Return what a reader must know before believing the table; empty where there is nothing."""
     found = []
     wanted = index["runs"]
-    assert isinstance(wanted, list)
+    assert isinstance(wanted, dict)
     if missing := len(wanted) - len(records):
         found.append(f"{missing} of {len(wanted)} runs are not finished; repeat `nonrigid bench` to finish them.")
     if (sources := len({record["source"] for record in records})) > 1:
@@ -165,6 +170,7 @@ def notes(index: Mapping[str, object], records: Sequence[Record]) -> list[str]:
 
 def _row(label: str, backend: object, split: str, records: Sequence[Record]) -> dict[str, object]:
     matched = [record for record in records if record.get("match_count")]
+    solved = [record for record in records if record["status"] != "refused"]
     statuses = Counter(record["status"] for record in records)
     return {
         "method": label,
@@ -178,8 +184,8 @@ def _row(label: str, backend: object, split: str, records: Sequence[Record]) -> 
         "mean_error_per_point_x100": _hundredfold(_mean(matched, "mean_error_per_point")),
         "matches": round(sum(record.get("match_count") or 0 for record in records) / max(len(records), 1), 1),
         "coverage": _mean(records, "coverage"),
-        "build_seconds": _mean(records, "build_seconds"),
-        "solve_seconds": _mean(records, "solve_seconds"),
+        "build_seconds": _mean(solved, "build_seconds"),
+        "solve_seconds": _mean(solved, "solve_seconds"),
         "status": ", ".join(f"{count} {status}" for status, count in statuses.most_common()),
     }
 

@@ -12,7 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from nonrigid.benchmark.formats import write_text
 from nonrigid.benchmark.report.figures import draw_figures
-from nonrigid.benchmark.report.table import COLUMNS, EXPLAINED, notes, pair_rows, refusals, summary
+from nonrigid.benchmark.report.table import COLUMNS, EXPLAINED, WIDE, by_method, notes, pair_rows, summary
 from nonrigid.benchmark.store import Record
 from nonrigid.benchmark.terminal import cell
 
@@ -36,14 +36,13 @@ def write_report(folder: Path, index: Mapping[str, object], records: Sequence[Re
     pages.filters["cell"] = cell
     page = pages.get_template("page.html").render(
         index=index,
-        rows=rows,
-        columns=COLUMNS,
+        tables=by_method(rows, WIDE),
+        headings=COLUMNS,
         explained=EXPLAINED,
         best=_best(rows),
         figures=figures,
         runs=runs,
-        refusals=refusals(records),
-        notes=notes(index, []) if not records else notes(index, records),
+        notes=notes(index, records),
         environment=_environment(folder),
     )
     write_text(out / "index.html", page)

@@ -1,0 +1,98 @@
+"""Plans are read whole or refused with the file, the key and the remedy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from nonrigid.benchmark.plan import read_plan
+from nonrigid.geometry.errors import NonrigidError
+
+GOOD = """
+backends = ["native", "nlopt:LD_CCSAQ+native"]
+[data]
+dataset = "creatures"
+vertices = 600
+names = ["cuts_fox_shape_1"]
+[limits]
+seconds = 5
+[[methods]]
+method = "gt"
+settings = { part_samples = 20, radii = [0.05, 0.1] }
+"""
+
+
+def test_a_plan_is_read_with_its_types(tmp_path: Path) -> None:
+    (tmp_path / "p.toml").write_text(GOOD)
+    plan = read_plan(tmp_path / "p.toml")
+    assert [spec.name for spec in plan.pairs()] == ["cuts_fox_shape_1"]
+    assert plan.limits.seconds == 5
+    assert plan.methods[0].formulation.radii == (0.05, 0.1)  # type: ignore[attr-defined]
+    assert plan.text == GOOD
+
+
+def test_shipped_plans_are_sound() -> None:
+    demo = read_plan("demo")
+    assert len(demo.pairs()) == 4
+    assert {word.partition(":")[0] for word in demo.backends} == {"native", "nlopt", "casadi", "cvxpy", "scipy"}
+    assert len(demo.backends) >= 8
+    assert len(read_plan("gt16").names) == 16
+
+
+@pytest.mark.realdata
+def test_the_sixteen_pairs_are_there(data: Path) -> None:
+    assert [spec.name for spec in read_plan("gt16", data=data).pairs()][::8] == [
+        "cuts_cat_shape_12",
+        "holes_cat_shape_4",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("[data]", "[data", "is not TOML"),
+        ('dataset = "creatures"', 'dataset = "faust"', "unknown data set 'faust'; choose one of: creatures"),
+        ("vertices = 600", "vertices = 10", "too few"),
+        ("vertices = 600", "vertex = 600", "unknown key of [data] of creatures 'vertex'"),
+        ('"native", ', '"natve", ', "unknown backend 'natve'"),
+        ('"native", ', '"nlopt:LD_CCSAQ+native", ', "twice"),
+        ("backends = [", "backend = [", "unknown key of the plan 'backend'"),
+        ('"native", "nlopt:LD_CCSAQ+native"', "", "backends has 0 entries"),
+        ("seconds = 5", "seconds = 0", "seconds is 0"),
+        ("seconds = 5", 'seconds = "5"', "give a number"),
+        ("seconds = 5", "second = 5", "unknown key of [limits] 'second'"),
+        ('method = "gt"', 'method = "zz"', "unknown method 'zz'"),
+        ("part_samples = 20", "part_sample = 20", "unknown setting of gt 'part_sample'"),
+        ("part_samples = 20", "part_samples = 2.5", "whole number"),
+        ("part_samples = 20", "sides = 'left'", "two-sided"),
+        ("radii = [0.05, 0.1]", "radii = 0.1", "several numbers"),
+        ("[data]", "metric = 'crow'\n[data]", "crow"),
+        ("[data]", "starts = 0\n[data]", "starts is 0"),
+        ("[data]", "seed = 1.5\n[data]", "seed is 1.5"),
+        ('[[methods]]\nmethod = "gt"', '[[methods]]\nmethod = "gt"\n[[methods]]\nmethod = "gt"', "own label"),
+    ],
+)
+def test_a_wrong_plan_names_file_key_and_remedy(tmp_path: Path, old: str, new: str, words: str) -> None:
+    assert old in GOOD
+    (tmp_path / "p.toml").write_text(GOOD.replace(old, new))
+    with pytest.raises(NonrigidError) as caught:
+        read_plan(tmp_path / "p.toml")
+    assert words in str(caught.value)
+    assert "p.toml" in str(caught.value)
+
+
+def test_an_unknown_pair_is_named(tmp_path: Path) -> None:
+    (tmp_path / "p.toml").write_text(GOOD.replace("cuts_fox_shape_1", "cuts_cat_shape_1"))
+    with pytest.raises(NonrigidError, match="unknown pair 'cuts_cat_shape_1'"):
+        read_plan(tmp_path / "p.toml").pairs()
+
+
+def test_data_can_be_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("NONRIGID_DATA", str(tmp_path / "here"))
+    assert read_plan("gt16").dataset.root == tmp_path / "here"  # type: ignore[attr-defined]
+    assert read_plan("gt16", data=tmp_path).dataset.root == tmp_path  # type: ignore[attr-defined]
+    with pytest.raises(NonrigidError, match="folder null"):
+        read_plan("gt16", data=tmp_path).pairs()
+    with pytest.raises(NonrigidError, match="leave out --data"):
+        read_plan("demo", data=tmp_path)
