@@ -104,4 +104,4 @@ def candidate_matches(
     alike, cost = nearest_rows(
         describe(pair.part, radii)[some], describe(pair.full, radii)[others], count=min(per_sample, len(others))
     )
-    return Candidates(np.repeat(some, alike.shape[1]), others[alike.ravel()], cost.ravel())
+    return Candidates(np.repeat(some, alike.size // len(some)), others[alike.ravel()], cost.ravel())

@@ -21,7 +21,8 @@ class SurfacePoints:
     faces
         (p,) face numbers, 0-based; -1 says that a point is unmatched.
     barycentric
-        (p, 3) weights of the face's corners, in the order the face lists them; each row sums to one (zero where unmatched).
+        (p, 3) weights of the face's corners, in the order the face lists them; each row sums to one (zero where
+        unmatched).
 
     Raises
     ------
@@ -72,7 +73,7 @@ class SurfacePoints:
 
     @classmethod
     def at_vertices(cls, mesh: Mesh, vertices: ArrayLike) -> SurfacePoints:
-        """Return the points at the given vertex numbers (-1 for unmatched); each takes the lowest-numbered face of its vertex.
+        """Return the points at the given vertex numbers (-1 for unmatched), each in its lowest-numbered face.
 
         Raises `InputError` if a vertex lies in no face.
         """

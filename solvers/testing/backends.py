@@ -171,6 +171,8 @@ def _check_answer(
     for given in (_random(problem, rng), dict(instance.values)):
         continued = _solved(problem, backend, given, limits)
         _check_honest(name, backend, problem, continued, limits)
+        if violation(problem, given) > limits.feasibility:  # a start outside the named constraints promises nothing
+            continue
         lost = sign * (problem.objective.value(given) - continued.objective)
         expect(
             lost <= accuracy * max(1.0, abs(instance.optimum)),
