@@ -1,0 +1,1 @@
+"""What a surface is: meshes, and everything derived from them."""
