@@ -1,1 +1,1 @@
-"""Which is best, and who says so?"""
+"""Say which method and which solver is best, and who says so."""
