@@ -161,8 +161,8 @@ class Surface:
     def distances_between(self, vertices: ArrayLike, method: str = "dijkstra", *, keep: bool = True) -> FloatArray:
         """Return the (s, s) distances along the surface between the given vertices, in the unit of the vertices.
 
-        The rows are computed a block at a time, so that memory stays small. `keep=False` says that these vertices will
-        not be asked for again: the answer is then not kept.
+        The rows are computed a block at a time, so that memory stays small. `keep=False` says that another run will
+        hardly ask for these vertices: the answer is then kept in memory only.
         """
         wanted = np.asarray(vertices, dtype=np.int64).reshape(-1)
         ascending, place = np.unique(wanted, return_inverse=True)
@@ -173,10 +173,9 @@ class Surface:
             made = self._geodesics(method)
             return {"square": np.vstack([made.distances(block)[:, ascending] for block in blocks])}
 
-        if not keep:
-            square: FloatArray = fresh()["square"]
-        else:
-            square = self._remember(content_hash(*key), lambda: self._stored(key, fresh)["square"])
+        square: FloatArray = self._remember(
+            content_hash(*key), lambda: self._stored(key, fresh)["square"] if keep else _frozen(fresh()["square"])
+        )
         return square if np.array_equal(wanted, ascending) else square[np.ix_(place, place)]
 
     def scaled(self, factor: float) -> Surface:
