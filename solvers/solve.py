@@ -38,13 +38,14 @@ def solve(
         one answers with a certified or stationary point. The best point of all attempts is returned, every attempt
         recorded.
     start
-        Values, or a `Solution` to continue from; by default the point of each set that prefers no entry.
+        Values, or a `Solution` to continue from; by default the problem's own start, and the point of each set that
+        prefers no entry for the variables of which it says nothing.
     starts
         Number of starts: the one above, then random points of the sets. The best answer is returned.
     seed
         Seed of the random starts.
     limits
-        Bounds on each attempt.
+        Bounds on each attempt; where the problem asks for fewer evaluations, these are the bound.
 
     Raises
     ------
@@ -62,7 +63,7 @@ def solve(
     >>> answer.status.value, round(answer.objective, 4), answer["u"].round(3)
     ('stationary', 0.5, array([0.5, 0.5, 0. ]))
     """
-    limits = Limits() if limits is None else limits
+    limits = _granted(problem, Limits() if limits is None else limits)
     chain = [backend] if isinstance(backend, str) or not isinstance(backend, Iterable) else list(backend)
     if not chain:
         raise InputError("the chain of backends is empty", remedy="name at least one, such as 'native'")
@@ -85,11 +86,17 @@ def _attempt(problem: Problem, backend: Backend, start: Values, limits: Limits) 
     return run_isolated(problem, backend, start, limits)
 
 
+def _granted(problem: Problem, limits: Limits) -> Limits:
+    asked = [count for count in (problem.evaluations, limits.evaluations) if count is not None]
+    return replace(limits, evaluations=min(asked, default=None))
+
+
 def _starts(problem: Problem, start: Values | Solution | None, count: int, seed: int) -> list[Values]:
     given = start.values if isinstance(start, Solution) else start
     shapes = {member.variable.name: member.variable.shape for member in problem.memberships}
     if given is None:
-        first: Values = {m.variable.name: m.set.center(m.variable.shape) for m in problem.memberships}
+        centers = {m.variable.name: m.set.center(m.variable.shape) for m in problem.memberships}
+        first: Values = {**centers, **problem.start}
     else:
         if {name: np.shape(value) for name, value in given.items()} != shapes:
             shown = {name: np.shape(value) for name, value in given.items()}

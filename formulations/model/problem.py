@@ -69,11 +69,15 @@ class Problem:
         One `variable @ set` for each variable.
     constraints
         Named smooth constraints on one variable: name -> (variable, constraint).
+    start
+        Where the method that states the problem would begin, for some or all variables; a caller's own start wins.
+    evaluations
+        How many evaluations the method asks for, where it needs no exact answer; a caller's smaller limit wins.
 
     Raises
     ------
     ModelError
-        If a variable of the objective has no set, or has two.
+        If a variable of the objective has no set, or has two, or a start is no finite array of a variable's shape.
 
     Examples
     --------
@@ -92,6 +96,8 @@ class Problem:
     objective: Objective
     memberships: tuple[Membership, ...]
     constraints: Mapping[str, tuple[Variable, SmoothConstraint]] = field(default_factory=lambda: MappingProxyType({}))
+    start: Mapping[str, FloatArray] = field(default_factory=lambda: MappingProxyType({}))
+    evaluations: int | None = None
 
     def __init__(
         self,
@@ -99,11 +105,15 @@ class Problem:
         objective: Objective,
         *memberships: Membership,
         constraints: Mapping[str, tuple[Variable, SmoothConstraint]] | None = None,
+        start: Mapping[str, FloatArray] | None = None,
+        evaluations: int | None = None,
     ) -> None:
         object.__setattr__(self, "name", name)
         object.__setattr__(self, "objective", objective)
         object.__setattr__(self, "memberships", memberships)
         object.__setattr__(self, "constraints", dict(constraints or {}))
+        object.__setattr__(self, "start", dict(start or {}))
+        object.__setattr__(self, "evaluations", evaluations)
         names = [variable.name for variable in self.variables]
         if len(set(names)) < len(names):
             raise ModelError(f"problem {name!r} puts a variable into two sets: {names}; intersect them or rename one")
@@ -111,6 +121,13 @@ class Problem:
         used |= {variable.name for variable, _ in self.constraints.values()}
         if missing := sorted(used - set(names)):
             raise ModelError(f"problem {name!r} uses {missing} but puts them in no set; add `{missing[0]} @ Free()`")
+        shapes = {variable.name: variable.shape for variable in self.variables}
+        for key, value in self.start.items():
+            if shapes.get(key) != np.shape(value) or not np.isfinite(value).all():
+                given = f"{key!r} of shape {np.shape(value)}"
+                raise ModelError(f"problem {name!r} starts at {given}; give finite arrays of shapes {shapes}")
+        if evaluations is not None and evaluations < 1:
+            raise ModelError(f"problem {name!r} asks for {evaluations} evaluations; ask for one at least, or None")
 
     @property
     def variables(self) -> tuple[Variable, ...]:
@@ -146,7 +163,26 @@ class Problem:
         memberships = tuple(member for member in self.memberships if member.variable.name not in values)
         constraints = {key: item for key, item in self.constraints.items() if item[0].name not in values}
         objective = replace(self.objective, terms=free, constant=constant)
-        return Problem(self.name, objective, *memberships, constraints=constraints)
+        start = {key: value for key, value in self.start.items() if key not in values}
+        return Problem(
+            self.name, objective, *memberships, constraints=constraints, start=start, evaluations=self.evaluations
+        )
+
+    def stage(
+        self, name: str, *, start: Mapping[str, FloatArray] | None = None, evaluations: int | None = None
+    ) -> Problem:
+        """Return the same problem under another name, with its own start and number of evaluations.
+
+        The objective's constant is left out: beside a large one every relative tolerance would be met at once.
+        """
+        return Problem(
+            name,
+            replace(self.objective, constant=0.0),
+            *self.memberships,
+            constraints=self.constraints,
+            start=start,
+            evaluations=evaluations,
+        )
 
     def latex(self) -> str:
         """Return the problem as one display of LaTeX."""
