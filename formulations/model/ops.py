@@ -28,6 +28,12 @@ class Ops(Protocol):
     def matmul(self, matrix: Any, value: Any) -> Any:
         """Return A x for a constant A."""
 
+    def multiply(self, matrix: Any, value: Any) -> Any:
+        """Return the entrywise product with a constant of the same shape."""
+
+    def column_norms(self, value: Any) -> Any:
+        """Return the Euclidean norm of each column."""
+
     def equal(self, left: Any, right: Any) -> Any:
         """State left = right."""
 
@@ -59,6 +65,14 @@ class NumpyOps:
     def matmul(self, matrix: Any, value: FloatArray) -> FloatArray:
         """Return A x."""
         return np.asarray(matrix @ value)
+
+    def multiply(self, matrix: Any, value: FloatArray) -> FloatArray:
+        """Return the entrywise product."""
+        return np.asarray(matrix * value)
+
+    def column_norms(self, value: FloatArray) -> FloatArray:
+        """Return the Euclidean norm of each column."""
+        return np.asarray(np.linalg.norm(value, axis=0))
 
     def equal(self, left: Any, right: Any) -> FloatArray:
         """Return |left - right|."""

@@ -46,6 +46,14 @@ class CasadiOps:
         """Return A x."""
         return as_dm(matrix) @ value
 
+    def multiply(self, matrix: Any, value: Any) -> Any:
+        """Return the entrywise product with a constant."""
+        return as_dm(matrix) * value
+
+    def column_norms(self, value: Any) -> Any:
+        """Return the Euclidean norm of each column; its derivative is infinite where a column vanishes."""
+        return ca.sqrt(ca.sum1(value * value))
+
     def equal(self, left: Any, right: Any) -> Relation:
         """State left = right."""
         return Relation(left - right, "equal")

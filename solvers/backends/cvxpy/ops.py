@@ -36,6 +36,14 @@ class CvxpyOps:
         """Return A x."""
         return matrix @ value
 
+    def multiply(self, matrix: Any, value: Any) -> Any:
+        """Return the entrywise product with a constant."""
+        return cp.multiply(matrix, value)
+
+    def column_norms(self, value: Any) -> Any:
+        """Return the Euclidean norm of each column, one second-order cone each."""
+        return cp.norm(value, 2, axis=0)
+
     def equal(self, left: Any, right: Any) -> Any:
         """State left = right."""
         return left == right
