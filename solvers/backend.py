@@ -16,16 +16,29 @@ from nonrigid.solvers import backends as builtin
 from nonrigid.solvers.acceptance import Acceptance
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.oracle import Oracle
+from nonrigid.solvers.solution import Bound
 
 ENTRY_POINTS = "nonrigid.backends"
 
 
 @dataclass(frozen=True, eq=False)
 class Raw:
-    """Hold what a backend hands back: its last point (flat, or None) and its own words."""
+    """Hold what a backend hands back.
+
+    Parameters
+    ----------
+    x
+        Its last point, flat, or None.
+    raw_status
+        Its own words.
+    bound
+        A bound that its search proved on the problem it was handed, in the problem's own sense: only for a method that
+        proves by construction, such as an exhaustive search. A library's report of optimality is no proof.
+    """
 
     x: FloatArray | None
     raw_status: str
+    bound: Bound | None = None
 
 
 class Backend(Protocol):

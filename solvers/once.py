@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from nonrigid.solvers.backend import Backend, Raw
 from nonrigid.solvers.judge import Judgement, Values, judge
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.oracle import LimitReached, NotFiniteError, Oracle
-from nonrigid.solvers.solution import Solution, TracePoint
+from nonrigid.solvers.solution import Bound, Solution, TracePoint
 from nonrigid.solvers.status import Status
 
 Report = Callable[[FloatArray, TracePoint], None]
@@ -46,7 +47,7 @@ def solve_once(
     # A failing term is the cause, what the library then says of it the consequence.
     status, message = _decide(judged, limits, oracle, oracle.failure or failure or error)
     claims = [bridge.claim for bridge in bridges if bridge.claim is not Claim.EXACT]
-    return head.solution(
+    solution = head.solution(
         status,
         message,
         values={} if judged is None else judged.values,
@@ -62,6 +63,16 @@ def solve_once(
         raw_status=raw.raw_status if failure is None else _words(failure),
         versions=backend.versions(),
     )
+    survives = not any(claim in (Claim.LOCAL, Claim.RESTRICTION) for claim in claims)
+    return _bounded(solution, raw.bound) if raw.bound is not None and survives else solution
+
+
+def _bounded(solution: Solution, bound: Bound) -> Solution:
+    """Return the solution with the bound of its backend, unless the solution itself refutes it."""
+    held = solution.with_bound(bound)
+    if held.gap is not None and held.gap < -1e-9 * max(1.0, abs(solution.objective)):
+        return replace(solution, message=f"{solution.message}; the bound {bound.value:.9g} ({bound.method}) is refuted")
+    return held
 
 
 class _Head:
