@@ -13,12 +13,17 @@ from nonrigid.solvers.acceptance import Native as TakenAsIs
 from nonrigid.solvers.backend import Raw
 from nonrigid.solvers.backends.native.generalised_power import generalised_power
 from nonrigid.solvers.backends.native.infection_immunisation import infection_immunisation
+from nonrigid.solvers.backends.native.injective_maps import branch_and_bound, exhaustive
+from nonrigid.solvers.backends.native.limited_memory import limited_memory
+from nonrigid.solvers.backends.native.matching import matching
 from nonrigid.solvers.backends.native.pairwise_frank_wolfe import pairwise_frank_wolfe
 from nonrigid.solvers.backends.native.projected_gradient import projected_gradient
 from nonrigid.solvers.backends.native.replicator import replicator
+from nonrigid.solvers.backends.native.reweighted import reweighted, robust_regression
+from nonrigid.solvers.capability import Capability
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.oracle import Oracle
-from nonrigid.solvers.structure import quadratic_game
+from nonrigid.solvers.structure import linear_assignment, quadratic_game, triple_assignment
 
 _DYNAMICS = {
     "replicator": replicator,
@@ -27,6 +32,9 @@ _DYNAMICS = {
     "projected_gradient": projected_gradient,
     "generalised_power": generalised_power,
 }
+_GENERAL = {"limited_memory": limited_memory, "reweighted": reweighted}
+_PROVING = {"branch_and_bound": branch_and_bound, "exhaustive": exhaustive, "matching": matching}
+_MOST_MAPS = 5_000_000
 _SIMPLEX_ONLY = {"replicator", "infection_immunisation", "pairwise_frank_wolfe"}
 
 
@@ -42,17 +50,27 @@ class Native:
 
     algorithm: str = ""
     name: ClassVar[str] = "native"
-    algorithms: ClassVar[tuple[str, ...]] = tuple(_DYNAMICS)
+    algorithms: ClassVar[tuple[str, ...]] = (*_DYNAMICS, *_GENERAL, *_PROVING)
 
     @classmethod
     def default_algorithm(cls, problem: Problem) -> str:
-        """Return the fastest dynamic known for the problem's shape."""
+        """Return the fastest algorithm known for the problem's shape, `limited_memory` for any other within bounds."""
         game = quadratic_game(problem)
-        curved = not isinstance(game, str) and game.surface.mix > 0.0
-        return "generalised_power" if curved else "projected_gradient"
+        if not isinstance(game, str):
+            return "generalised_power" if game.surface.mix > 0.0 else "projected_gradient"
+        if not isinstance(robust_regression(problem), str):
+            return "reweighted"
+        if not isinstance(triple_assignment(problem), str):
+            return "branch_and_bound"
+        if not isinstance(linear_assignment(problem), str):
+            return "matching"
+        return "limited_memory" if Capability().obstacle(problem) is None else "projected_gradient"
 
     def accepts(self, problem: Problem) -> Acceptance:
-        """Take quadratic games: each dynamic on the surfaces it knows."""
+        """Take quadratic games, robust regressions and smooth problems within bounds: each algorithm what it knows."""
+        if self.algorithm in _GENERAL or self.algorithm in _PROVING:
+            wanted = self._obstacle(problem)
+            return TakenAsIs() if wanted is None else Refused(f"{self.algorithm}: {wanted}")
         game = quadratic_game(problem)
         if isinstance(game, str):
             return Refused(f"{self.algorithm} needs {game}")
@@ -69,8 +87,20 @@ class Native:
             )
         return TakenAsIs()
 
+    def _obstacle(self, problem: Problem) -> str | None:
+        if self.algorithm == "limited_memory":
+            return Capability().obstacle(problem)
+        if self.algorithm in _PROVING:
+            return _search_obstacle(self.algorithm, problem)
+        regression = robust_regression(problem)
+        return f"it needs {regression}" if isinstance(regression, str) else None
+
     def run(self, oracle: Oracle, start: FloatArray, limits: Limits) -> Raw:
-        """Run the dynamic."""
+        """Run the algorithm."""
+        if self.algorithm in _PROVING:
+            return _PROVING[self.algorithm](oracle, start, limits)
+        if self.algorithm in _GENERAL:
+            return Raw(*_GENERAL[self.algorithm](oracle, start, limits))
         game = quadratic_game(oracle.problem)
         assert not isinstance(game, str)
         x, words = _DYNAMICS[self.algorithm](game, oracle, start, limits)
@@ -80,6 +110,18 @@ class Native:
     def versions(cls) -> dict[str, str]:
         """Return the versions of what the numbers depend on."""
         return {"nonrigid": version("nonrigid"), "numpy": version("numpy")}
+
+
+def _search_obstacle(algorithm: str, problem: Problem) -> str | None:
+    if algorithm == "matching":
+        linear = linear_assignment(problem)
+        return f"it needs {linear}" if isinstance(linear, str) else None
+    triple = triple_assignment(problem)
+    if isinstance(triple, str):
+        return f"it needs {triple}"
+    if algorithm == "exhaustive" and triple.maps > _MOST_MAPS:
+        return f"it evaluates every map: {triple.maps} of them, at most {_MOST_MAPS} work; use native:branch_and_bound"
+    return None
 
 
 BACKEND = Native
