@@ -17,6 +17,7 @@ from nonrigid.solvers.backends.native.injective_maps import branch_and_bound, ex
 from nonrigid.solvers.backends.native.limited_memory import limited_memory
 from nonrigid.solvers.backends.native.matching import matching
 from nonrigid.solvers.backends.native.pairwise_frank_wolfe import pairwise_frank_wolfe
+from nonrigid.solvers.backends.native.procrustes import procrustes, procrustes_gain
 from nonrigid.solvers.backends.native.projected_gradient import projected_gradient
 from nonrigid.solvers.backends.native.replicator import replicator
 from nonrigid.solvers.backends.native.reweighted import reweighted, robust_regression
@@ -32,7 +33,7 @@ _DYNAMICS = {
     "projected_gradient": projected_gradient,
     "generalised_power": generalised_power,
 }
-_GENERAL = {"limited_memory": limited_memory, "reweighted": reweighted}
+_GENERAL = {"limited_memory": limited_memory, "reweighted": reweighted, "procrustes": procrustes}
 _PROVING = {"branch_and_bound": branch_and_bound, "exhaustive": exhaustive, "matching": matching}
 _MOST_MAPS = 5_000_000
 _SIMPLEX_ONLY = {"replicator", "infection_immunisation", "pairwise_frank_wolfe"}
@@ -60,6 +61,8 @@ class Native:
             return "generalised_power" if game.surface.mix > 0.0 else "projected_gradient"
         if not isinstance(robust_regression(problem), str):
             return "reweighted"
+        if not isinstance(procrustes_gain(problem), str):
+            return "procrustes"
         if not isinstance(triple_assignment(problem), str):
             return "branch_and_bound"
         if not isinstance(linear_assignment(problem), str):
@@ -92,6 +95,9 @@ class Native:
             return Capability().obstacle(problem)
         if self.algorithm in _PROVING:
             return _search_obstacle(self.algorithm, problem)
+        if self.algorithm == "procrustes":
+            gain = procrustes_gain(problem)
+            return f"it needs {gain}" if isinstance(gain, str) else None
         regression = robust_regression(problem)
         return f"it needs {regression}" if isinstance(regression, str) else None
 
