@@ -77,7 +77,10 @@ class IsometricMatching:
         part, full = self._samples(pair)
         ratio = distance_ratios(pair.part.distances_between(part), pair.full.distances_between(full), self.ratio)
         P = Variable("P", (len(part), len(full)))
-        chosen = (yield Problem("sparse", minimize(TripleDistortion(ratio)(P)), P @ PartialPermutation()))["P"]
+        # Relaxations begin where no map is preferred: each map is stationary for many of them.
+        even = {"P": np.full(P.shape, 1.0 / len(full))}
+        sparse = Problem("sparse", minimize(TripleDistortion(ratio)(P)), P @ PartialPermutation(), start=even)
+        chosen = (yield sparse)["P"]
         anchors = full[chosen.argmax(axis=1)]
         rows = _far_samples(pair.part, self.matches)
         cost, columns = self._extension(pair, part, anchors, rows)

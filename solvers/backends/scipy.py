@@ -1,4 +1,4 @@
-"""SciPy's minimizers: the peers that a user would pick first."""
+"""SciPy's minimizers: the peers that a user would pick first; and HiGHS for linear problems."""
 
 from __future__ import annotations
 
@@ -12,13 +12,16 @@ import numpy as np
 import scipy.optimize
 from scipy.sparse import csr_array
 
-from nonrigid.formulations.model import Problem
+from nonrigid.formulations.model import Curvature, Problem
+from nonrigid.formulations.model.binary_sets import integral_entries
 from nonrigid.geometry.arrays import FloatArray
-from nonrigid.solvers.acceptance import Acceptance, Refused
+from nonrigid.solvers.acceptance import Acceptance, Native, Refused, Via
 from nonrigid.solvers.backend import Raw
+from nonrigid.solvers.bridges.hull import ToHull
+from nonrigid.solvers.bridges.pair_lift import PairLift
 from nonrigid.solvers.bridges.radial import Radial
 from nonrigid.solvers.capability import Capability, accept
-from nonrigid.solvers.layout import FlatConstraint
+from nonrigid.solvers.layout import FlatConstraint, Layout
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.oracle import NotFiniteError, Oracle
 
@@ -48,7 +51,7 @@ class Scipy:
     ----------
     algorithm
         "L-BFGS-B" (bounds only; surfaces by rays), "SLSQP" or "trust-constr" (with products of the Hessian where every
-        term offers them).
+        term offers them); "milp" (HiGHS, for linear objectives and constraints, integral entries or not).
 
     Examples
     --------
@@ -58,7 +61,7 @@ class Scipy:
 
     algorithm: str = ""
     name: ClassVar[str] = "scipy"
-    algorithms: ClassVar[tuple[str, ...]] = tuple(_CAPABILITIES)
+    algorithms: ClassVar[tuple[str, ...]] = (*_CAPABILITIES, "milp")
 
     @classmethod
     def default_algorithm(cls, problem: Problem) -> str:
@@ -67,10 +70,18 @@ class Scipy:
 
     def accepts(self, problem: Problem) -> Acceptance:
         """Take what the algorithm takes; surfaces by rays where it knows bounds only."""
-        return accept(problem, self.algorithm, _CAPABILITIES[self.algorithm], [(), (Radial(),)])
+        if self.algorithm == "milp":
+            lifted = PairLift().obstacle(problem) is None
+            obstacle = None if lifted else _nonlinear_obstacle(problem)
+            if obstacle is not None:
+                return Refused(f"milp: {obstacle}")
+            return Via((PairLift(),)) if lifted else Native()
+        return accept(problem, self.algorithm, _CAPABILITIES[self.algorithm], [(), (Radial(),), (ToHull(),)])
 
     def run(self, oracle: Oracle, start: FloatArray, limits: Limits) -> Raw:
         """Run the algorithm; a limit leaves it as an exception, and the oracle has kept the best point."""
+        if self.algorithm == "milp":
+            return _milp(oracle, start, limits)
         arguments: dict[str, Any] = {"options": _options(self.algorithm, limits)}
         if self.algorithm == "trust-constr":
             arguments["constraints"] = [_nonlinear(item, oracle) for item in oracle.constraints]
@@ -107,6 +118,38 @@ def _options(algorithm: str, limits: Limits) -> dict[str, Any]:
         return {"ftol": max(1e-3 * limits.tolerance**2, 1e-15), "maxiter": _UNBOUNDED}
     # Its gradient test does not look at complementarity, so it stops far from the bounds: only the radius may stop it.
     return {"gtol": 0.0, "xtol": 1e-8, "barrier_tol": tight, "maxiter": _UNBOUNDED}
+
+
+def _nonlinear_obstacle(problem: Problem) -> str | None:
+    if problem.curvature is not Curvature.AFFINE:
+        return f"it takes linear objectives only, and {problem.name!r} declares none"
+    for item in Layout(problem).constraints():
+        if not item.constraint.linear:
+            return f"it takes linear constraints only, and {item.name!r} is none"
+    return None
+
+
+def _milp(oracle: Oracle, start: FloatArray, limits: Limits) -> Raw:
+    oracle.observe(start)
+    slope = oracle.value_and_gradient(start)[1]
+    rows = []
+    for item in oracle.constraints:
+        offset, jacobian = item.value_and_jacobian(np.zeros(oracle.size))
+        lowest = -offset if item.constraint.kind == "equal" else np.full(len(offset), -np.inf)
+        rows.append(scipy.optimize.LinearConstraint(csr_array(jacobian), lowest, -offset))
+    parts: list[Any] = [integral_entries(m.set, m.variable.shape).ravel() for m in oracle.problem.memberships]
+    oracle.built()
+    milp: Any = scipy.optimize.milp
+    found = milp(
+        slope,
+        integrality=np.concatenate(parts).astype(int),
+        bounds=scipy.optimize.Bounds(oracle.lower, oracle.upper),
+        constraints=rows,
+        options={"mip_rel_gap": 1e-9} | ({} if limits.seconds is None else {"time_limit": float(limits.seconds)}),
+    )
+    if found.x is not None:
+        oracle.observe(found.x)
+    return Raw(None if found.x is None else np.asarray(found.x, float), f"{found.status}: {found.message}")
 
 
 def _second_order(problem: Problem) -> bool:

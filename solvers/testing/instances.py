@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
-from itertools import combinations
+from itertools import combinations, permutations
 from typing import Any
 
 import numpy as np
 
+from nonrigid.formulations.isometric import distance_ratios
 from nonrigid.formulations.model import (
     Applicable,
     Box,
@@ -25,6 +26,9 @@ from nonrigid.formulations.model import (
     maximize,
     minimize,
 )
+from nonrigid.formulations.model.assignment_sets import Assignment, PartialPermutation
+from nonrigid.formulations.model.terms.linear import Linear
+from nonrigid.formulations.model.terms.triple_distortion import TripleDistortion
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.testing.sets import HalfSquaredDistance
 
@@ -186,6 +190,35 @@ def two_variables() -> Instance:
     )
 
 
+def injective_map() -> Instance:
+    """Return the least triple distortion from 3 points of a plane to 5, proved by trying all 60 maps."""
+    rng = np.random.default_rng(1)
+    target = rng.random((5, 2))
+    source = 1.3 * target[:3] + 0.05 * rng.standard_normal((3, 2))
+    part, full = (np.linalg.norm(p[:, None] - p[None], axis=2) for p in (source, target))
+    term, shape = TripleDistortion(distance_ratios(part, full, "logarithmic")), (3, 5)
+    maps = [np.eye(5)[list(columns)] for columns in permutations(range(5), 3)]
+    best = min(maps, key=lambda chosen: term.value_and_gradient(chosen)[0])
+    P = Variable("P", shape)
+    start = {"P": np.full(shape, 0.2)}
+    return Instance(
+        problem=Problem("injective map", minimize(term(P)), P @ PartialPermutation(), start=start),
+        optimum=term.value_and_gradient(best)[0],
+        values={"P": best},
+        certificate="all 60 maps",
+        unimodal=False,
+    )
+
+
+def transport() -> Instance:
+    """Return a linear assignment of 3 rows to 4 columns, proved by the prices (0, -1, 0, 0) of the columns."""
+    cost = np.array([[2.0, 0.0, 3.0, 4.0], [5.0, 1.0, 3.0, 4.0], [5.0, 4.0, 6.0, 3.0]])
+    X = Variable("X", (3, 4))
+    values = {"X": np.eye(4)[[0, 1, 3]]}
+    problem = Problem("transport", minimize(Linear(cost)(X)), X @ Assignment())
+    return Instance(problem=problem, optimum=6.0, values=values, certificate="column prices")
+
+
 class SquaredGap(Applicable):
     """Evaluate |x - y|^2 in two arguments."""
 
@@ -210,4 +243,6 @@ _MAKERS: tuple[Callable[[], Instance], ...] = (
     spectral,
     ball,
     two_variables,
+    injective_map,
+    transport,
 )

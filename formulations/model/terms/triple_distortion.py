@@ -20,7 +20,7 @@ class TripleDistortion(Applicable):
     r_ia is `ratio[i, a, j, l]` where row i is assigned column j and row a column l; the mean is extended to matrices
     that are no assignments as the multilinear form sum P_ij P_al P_cm |ratio[i, a, j, l] - ratio[i, c, j, m]| / t over
     the t = k (k - 1)(k - 2) / 2 triples. Where two of the columns j, l, m agree, which no assignment does, the
-    coefficient is the largest of all the others, so that a relaxation gains nothing by it.
+    coefficient is the mean of all the others, so that a relaxation has no reason to seek them.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class TripleDistortion(Applicable):
         cost = np.abs(ratio[i, a][:, :, :, None] - ratio[i, c][:, :, None, :]) / len(triples)
         of_i, of_a, of_c = np.ogrid[:n, :n, :n]
         collide = (of_i == of_a) | (of_i == of_c) | (of_a == of_c)
-        cost[:, collide] = cost[:, ~collide].max(initial=0.0)
+        cost[:, collide] = cost[:, ~collide].mean()
         object.__setattr__(self, "ratio", ratio)
         object.__setattr__(self, "triples", triples)
         object.__setattr__(self, "cost", cost)

@@ -14,12 +14,14 @@ import numpy as np
 from nonrigid.formulations.model import Problem
 from nonrigid.formulations.model.binary_sets import integral_entries
 from nonrigid.geometry.arrays import BoolArray, FloatArray
-from nonrigid.solvers.acceptance import Acceptance, Native, Refused, via
+from nonrigid.solvers.acceptance import Acceptance, Bridge, Native, Refused, Via, via
 from nonrigid.solvers.backend import Raw
 from nonrigid.solvers.backends.casadi.functions import StopAsked
 from nonrigid.solvers.backends.casadi.settings import QP_PLUGINS, solver_options
 from nonrigid.solvers.backends.casadi.transcription import second_order_obstacle, transcribe
+from nonrigid.solvers.bridges.hull import ToHull
 from nonrigid.solvers.bridges.kkt_mixed_integer import KktMixedInteger
+from nonrigid.solvers.bridges.pair_lift import PairLift
 from nonrigid.solvers.layout import Layout
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.oracle import Oracle
@@ -73,6 +75,19 @@ class Casadi:
         """Take smooth problems in sets of any kind; entries that are integral by bonmin alone."""
         if self.algorithm == "bonmin" and not isinstance(quadratic_game(problem), str):
             return via(problem, KktMixedInteger())
+        if ToHull().obstacle(problem) is None:
+            lifted = PairLift().obstacle(problem)
+            if self.algorithm == "bonmin" and lifted is None:
+                return self._through(problem, PairLift())
+            if self.algorithm != "bonmin":
+                return self._through(problem, ToHull())
+        return self._takes(problem)
+
+    def _through(self, problem: Problem, bridge: Bridge) -> Acceptance:
+        taken = self._takes(bridge.apply(problem).problem)
+        return taken if isinstance(taken, Refused) else Via((bridge,))
+
+    def _takes(self, problem: Problem) -> Native | Refused:
         integral = int(_integral(problem).sum())
         if integral and self.algorithm != "bonmin":
             return Refused(

@@ -9,7 +9,8 @@ from typing import Any, ClassVar
 
 import cvxpy
 
-from nonrigid.formulations.model import Problem
+from nonrigid.formulations.model import Curvature, Problem
+from nonrigid.formulations.model.binary_sets import integral_entries
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.acceptance import Acceptance, Native, Refused, Via, via
 from nonrigid.solvers.backend import Raw
@@ -17,6 +18,8 @@ from nonrigid.solvers.backends.cvxpy.lowering import Lowered, is_convex, set_obs
 from nonrigid.solvers.backends.cvxpy.settings import CONIC, NONLINEAR, QUADRATIC, convex_options, nonlinear_options
 from nonrigid.solvers.backends.cvxpy.successive import successive
 from nonrigid.solvers.bridges.body import ToBody
+from nonrigid.solvers.bridges.hull import ToHull
+from nonrigid.solvers.bridges.pair_lift import PairLift
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.oracle import Oracle
 
@@ -60,9 +63,17 @@ class Cvxpy:
             return self._accepts_nonlinear(problem)
         if self.algorithm not in _installed():
             return Refused(f"{self.algorithm}: CVXPY does not find it; install {_PACKAGES[self.algorithm]}")
-        obstacle = set_obstacle(problem, quadratic=self.algorithm in CONIC)
+        branches = self.algorithm == "HIGHS"
+        if ToHull().obstacle(problem) is None:
+            if branches and PairLift().obstacle(problem) is None:
+                return Via((PairLift(),))
+            if not branches or problem.curvature is not Curvature.AFFINE:
+                return Via((ToHull(),))
+        obstacle = set_obstacle(problem, quadratic=self.algorithm in CONIC, integral=branches)
         if obstacle is not None:
             return Refused(f"{self.algorithm}: {obstacle}")
+        if branches and any(integral_entries(m.set, m.variable.shape).any() for m in problem.memberships):
+            return Native()
         if all(member.set.convex for member in problem.memberships):
             return Native()
         taken: Via | Refused = via(problem, ToBody())

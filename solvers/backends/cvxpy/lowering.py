@@ -8,8 +8,9 @@ from typing import Any
 import cvxpy
 import numpy as np
 
-from nonrigid.formulations.model import Applied, Curvature, Problem, Sense
-from nonrigid.geometry.arrays import FloatArray
+from nonrigid.formulations.model import Applied, Curvature, Problem, Sense, Variable
+from nonrigid.formulations.model.binary_sets import integral_entries
+from nonrigid.geometry.arrays import BoolArray, FloatArray
 from nonrigid.solvers.backends.cvxpy.ops import CvxpyOps
 from nonrigid.solvers.layout import Layout
 from nonrigid.solvers.oracle import Oracle
@@ -24,7 +25,10 @@ class Lowered:
         self.layout = oracle.layout
         self.problem = oracle.problem
         self.sign = 1.0 if self.problem.objective.sense is Sense.MINIMIZE else -1.0
-        self.variables: dict[str, Any] = {v.name: cp.Variable(v.shape, name=v.name) for v in self.problem.variables}
+        self.variables: dict[str, Any] = {
+            m.variable.name: _variable(m.variable, integral_entries(m.set, m.variable.shape))
+            for m in self.problem.memberships
+        }
         self.constraints = [row for member in self.problem.memberships for row in self._membership(member)]
         for variable, condition in self.problem.constraints.values():
             self.constraints.append(self._affine(variable, condition))
@@ -99,8 +103,11 @@ def keeps(applied: Applied, sign: float) -> bool:
     return hasattr(applied.term, "lower") and (sign * applied).curvature is Curvature.CONVEX
 
 
-def set_obstacle(problem: Problem, *, quadratic: bool) -> str | None:
-    """Return why sets or constraints cannot be handed to CVXPY; `quadratic` where the solver takes curved ones."""
+def set_obstacle(problem: Problem, *, quadratic: bool, integral: bool = False) -> str | None:
+    """Return why sets or constraints cannot be handed to CVXPY.
+
+    `quadratic` where the solver takes curved ones, `integral` where it branches.
+    """
     for name, (_, condition) in problem.constraints.items():
         if not condition.linear:
             return f"CVXPY cannot see into the curved constraint {name!r}; use casadi:ipopt"
@@ -110,10 +117,18 @@ def set_obstacle(problem: Problem, *, quadratic: bool) -> str | None:
             return f"CVXPY needs the formula of {member.set}, which has no `lower`; use casadi:ipopt"
         if curved and not quadratic:
             return f"it takes linear constraints only, and {member.set} is curved; use CLARABEL or SCS"
-    integral = sum(int(np.sum(getattr(member.set, "integral", False))) for member in problem.memberships)
-    if integral:
-        return f"it cannot branch, and {integral} entries are integral; use casadi:bonmin"
+    whole = sum(int(integral_entries(m.set, m.variable.shape).sum()) for m in problem.memberships)
+    if whole and not integral:
+        return f"it cannot branch, and {whole} entries are integral; use casadi:bonmin or cvxpy:HIGHS"
+    if whole and not (problem.curvature is Curvature.AFFINE and is_convex(problem)):
+        return f"it branches on linear objectives only, and {problem.name!r} has {whole} integral entries and another"
     return None
+
+
+def _variable(variable: Variable, integral: BoolArray) -> Any:
+    if integral.all():
+        return cp.Variable(variable.shape, name=variable.name, boolean=True)
+    return cp.Variable(variable.shape, name=variable.name, boolean=np.nonzero(integral) if integral.any() else False)
 
 
 def size_of(problem: Problem) -> int:
