@@ -1,0 +1,198 @@
+"""Partial functional maps: a functional map and the region of the whole it covers, found by turns."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from nonrigid.formulations.candidates import describe
+from nonrigid.formulations.formulation import Correspondence, Pair, Solved, Stages
+from nonrigid.formulations.functional_maps import estimated_rank, matched_rows, slanted_mask, spectral_closest_points
+from nonrigid.formulations.game_theoretic import GameTheoretic
+from nonrigid.formulations.model import Problem, Variable, free, minimize
+from nonrigid.formulations.model.terms.area_gap import AreaGap
+from nonrigid.formulations.model.terms.gram_penalty import GramPenalty
+from nonrigid.formulations.model.terms.masked_data import MaskedBasis, MaskedData
+from nonrigid.formulations.model.terms.mumford_shah import MumfordShah
+from nonrigid.formulations.model.terms.weighted_squares import WeightedSquares
+from nonrigid.geometry.arrays import FloatArray, IntArray
+from nonrigid.geometry.errors import InputError, UnknownNameError
+from nonrigid.geometry.geodesics import make_geodesics
+from nonrigid.geometry.spectrum import Spectrum
+
+Start = Literal["mask", "anchors"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartialFunctionalMap:
+    """Match densely by a functional map C and a soft region eta(v) of the whole that explain the part's descriptors.
+
+    Minimize over C, (k, k), and v, one number a vertex of the whole,
+
+        ||C A - B(eta(v))||_{2,1} + mask_weight ||C o W||_F^2 + orthogonality_weight ||C'C - diag(d)||_F^2
+        + area_weight (|part| - |eta(v)|)^2 + edge_weight * integral of xi(v) |grad v|,
+
+    A and B the coefficients of descriptors, W 0 along a slanted diagonal, d one for as many columns as the part has
+    eigenfunctions with a counterpart. C and v are found by turns; between them C is made orthonormal by closest
+    points. The alternation ends, one round back, when a step in C ends no lower than the one before it did, the terms
+    in v alone not counted. Then it runs again on functions of the distances to landmarks that the first run matched.
+
+    Parameters
+    ----------
+    eigenfunctions
+        k; a surface with fewer vertices gives fewer.
+    radii
+        Radii of the SHOT descriptors, in units of sqrt(full area).
+    start
+        "mask": C is large where W is small, as published. "anchors": no descriptors, landmarks alone, from the matches
+        of `GameTheoretic`.
+    mask_weight, orthogonality_weight, area_weight, edge_weight
+        Weights for a full surface of area 1. The published ones, 1, 1e3, 1 and 1e2, hold for an area of about 1.75e4:
+        lengths there are 132 times longer, and the terms change as its powers 0, 0, 4 and 1, the data as its power 1.
+    rounds
+        Largest number of alternations of a run.
+    landmarks
+        Number of landmarks of the second run; 0 for no second run.
+    landmark_decay
+        Landmark functions are exp(-decay * distance), decay in units of 1 / sqrt(full area).
+    closest_point_iterations, closest_point_samples
+        Of the step between C and v: steps at most, and samples of the part.
+    map_evaluations, region_evaluations
+        Evaluations granted to each problem in C and in v: exact answers of the blocks gain nothing.
+
+    Source: Rodola, Cosmo, Bronstein, Torsello and Cremers, partial functional correspondence (CGF 2017).
+
+    Examples
+    --------
+    >>> PartialFunctionalMap(start="anchors").eigenfunctions
+    90
+    """
+
+    eigenfunctions: int = 90
+    radii: tuple[float, ...] = (0.04,)
+    start: Start = "mask"
+    mask_weight: float = 7.6e-3
+    orthogonality_weight: float = 7.6
+    area_weight: float = 2.3e6
+    edge_weight: float = 1e2
+    rounds: int = 6
+    landmarks: int = 50
+    landmark_decay: float = 46.0
+    closest_point_iterations: int = 10
+    closest_point_samples: int = 500
+    map_evaluations: int = 300
+    region_evaluations: int = 60
+
+    method: ClassVar[str] = "pfm"
+
+    def stages(self, pair: Pair) -> Stages:
+        """State the problems in C and in v by turns; return one match a vertex of the part."""
+        if self.start not in ("mask", "anchors"):
+            raise UnknownNameError("start", self.start, ("mask", "anchors"))
+        for name in ("eigenfunctions", "rounds", "closest_point_samples"):
+            if getattr(self, name) < 1:
+                raise InputError(f"{name} is {getattr(self, name)}", remedy="give a number of at least 1")
+        bases = Bases.of(pair, self.eigenfunctions, self.closest_point_samples)
+        mask = slanted_mask(bases.size, bases.rank)
+        C = (mask.max() - mask) / mask.max() if mask.max() > 0.0 else np.ones_like(mask)
+        if self.start == "anchors":
+            anchors = yield from GameTheoretic().stages(pair)
+            descriptors = self._near(pair, *_vertices(pair, anchors))
+        else:
+            descriptors = describe(pair.part, self.radii), describe(pair.full, self.radii)
+        C = yield from self._alternate(pair, bases, descriptors, C)
+        if self.landmarks:
+            chosen = pair.part.samples(min(self.landmarks, len(pair.part.mesh.vertices)))
+            found = matched_rows(C[:, : bases.rank], bases.part.eigenfunctions[chosen, : bases.rank], bases.full_rows)
+            C = yield from self._alternate(pair, bases, self._near(pair, chosen, found), C)
+        matches = matched_rows(C[:, : bases.rank], bases.part.eigenfunctions[:, : bases.rank], bases.full_rows)
+        return Correspondence.between_vertices(pair, np.arange(len(matches)), matches)
+
+    def joint(self, pair: Pair, bases: Bases, descriptors: tuple[FloatArray, FloatArray]) -> Problem:
+        """Return the problem in C and v for descriptors (n, q) of the part and of the whole."""
+        C, v = Variable("C", (bases.size, bases.size)), Variable("v", len(bases.full.mass))
+        whole = MaskedBasis(bases.full.eigenfunctions, bases.full.mass, descriptors[1], np.float32)
+        mesh = pair.full.mesh
+        energy = (
+            MaskedData(bases.part.project(descriptors[0]), whole)(C, v)
+            + self.mask_weight * WeightedSquares(slanted_mask(bases.size, bases.rank))(C)
+            + self.area_weight * AreaGap(bases.full.mass, float(bases.part.mass.sum()))(v)
+            + self.edge_weight * MumfordShah(mesh.vertices, mesh.faces)(v)
+        )
+        if self.orthogonality_weight:
+            wanted = (np.arange(bases.size) < bases.rank).astype(float)
+            energy = energy + self.orthogonality_weight * GramPenalty(wanted)(C)
+        return Problem("partial functional map", minimize(energy), C @ free(), v @ free())
+
+    def _alternate(
+        self, pair: Pair, bases: Bases, descriptors: tuple[FloatArray, FloatArray], C: FloatArray
+    ) -> Generator[Problem, Solved, FloatArray]:
+        """Solve for C and for v by turns while the former's energy falls; return the last orthonormal map kept."""
+        joint = self.joint(pair, bases, descriptors)
+        v = np.ones(len(bases.full.mass))
+        energy, kept = np.inf, C
+        for number in range(self.rounds):
+            solved = yield joint.fix(v=v).stage("C", start={"C": C}, evaluations=self.map_evaluations)
+            if solved.objective >= energy:
+                break
+            energy = solved.objective
+            C = kept = bases.orthonormal(solved["C"], self.closest_point_iterations)
+            if number < self.rounds - 1:
+                image = bases.full.eigenfunctions @ (C @ bases.part.project(np.ones(len(bases.part.mass))))
+                solved = yield joint.fix(C=C).stage("v", start={"v": image}, evaluations=self.region_evaluations)
+                v = solved["v"]
+        return kept
+
+    def _near(self, pair: Pair, part: IntArray, full: IntArray) -> tuple[FloatArray, FloatArray]:
+        """Return functions that fall off exponentially from matched vertices, one a match, on either surface."""
+        around_part = pair.part.distances(part)
+        around_full = make_geodesics(pair.full.mesh, "dijkstra").distances(full)  # no other run asks for these again
+        return np.exp(-self.landmark_decay * around_part.T), np.exp(-self.landmark_decay * around_full.T)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Bases:
+    """Hold the eigenfunctions of either surface, the rank of maps between them, and samples for closest points."""
+
+    part: Spectrum
+    full: Spectrum
+    rank: int
+    samples: IntArray
+
+    @classmethod
+    def of(cls, pair: Pair, eigenfunctions: int, samples: int) -> Bases:
+        """Return the bases of a pair, as many eigenfunctions as wanted or as the smaller surface has."""
+        fewest = min(len(pair.part.mesh.vertices), len(pair.full.mesh.vertices))
+        size = min(eigenfunctions, fewest - 1)
+        part, full = pair.part.spectrum(size), pair.full.spectrum(size)
+        chosen = pair.part.samples(min(samples, len(pair.part.mesh.vertices)))
+        return cls(part=part, full=full, rank=estimated_rank(part.eigenvalues, full.eigenvalues), samples=chosen)
+
+    @property
+    def size(self) -> int:
+        """Number of eigenfunctions."""
+        return len(self.full.eigenvalues)
+
+    @property
+    def full_rows(self) -> FloatArray:
+        """One row a vertex of the whole, (n, k)."""
+        return self.full.eigenfunctions
+
+    def orthonormal(self, C: FloatArray, iterations: int) -> FloatArray:
+        """Return the map that closest points make of C: orthonormal columns up to the rank, zeros beyond it."""
+        rows = self.part.eigenfunctions[self.samples, : self.rank]
+        D, _ = spectral_closest_points(C[:, : self.rank], rows, self.full_rows, iterations=iterations)
+        padded = np.zeros_like(C)
+        padded[:, : self.rank] = D
+        return padded
+
+
+def _vertices(pair: Pair, matches: Correspondence) -> tuple[IntArray, IntArray]:
+    """Return the vertices of the repaired views that a sparse correspondence between vertices names."""
+    part = pair.part.clean_view.vertex_of_raw[matches.part_vertices]
+    full = pair.full.clean_view.from_raw(matches.points).nearest_corner(pair.full.mesh)
+    known = (part >= 0) & (full >= 0)
+    return part[known], full[known]
