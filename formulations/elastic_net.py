@@ -41,7 +41,7 @@ class ElasticNetMatching:
     """
 
     mix: float = 0.8
-    floor: float = 0.05
+    floor: float = 0.35
     kernel_width: float = 0.03
     part_samples: int = 300
     full_samples: int = 1000
