@@ -1,0 +1,133 @@
+"""Samples of both surfaces with all distances between them, and what these say of a map between the samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from nonrigid.formulations.candidates import Candidates
+from nonrigid.formulations.formulation import Pair
+from nonrigid.formulations.trusted_descriptors import TrustedDescriptors
+from nonrigid.geometry.arrays import FloatArray, IntArray
+
+NEAR = 0.15
+"""Distance, in units of sqrt(full area), at which the agreement with another sample counts 1/e."""
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SampledDistances:
+    """Hold samples of the part and of the full surface, their distances and their descriptors' differences.
+
+    Candidates and images below are in the numbers of the samples: rows of `points` and of `grid`.
+
+    Parameters
+    ----------
+    points
+        (p,) vertices of the part; distances are known from the first s of them.
+    grid
+        (g,) vertices of the full surface.
+    on_part, on_full
+        (s, p) and (g, g) distances, in units of sqrt(full area).
+    unlike
+        (p, g) trusted squared differences of descriptors.
+    """
+
+    points: IntArray
+    grid: IntArray
+    on_part: FloatArray
+    on_full: FloatArray
+    unlike: FloatArray
+
+    @property
+    def between(self) -> FloatArray:
+        """(s, s) distances between those samples of the part from which distances are known."""
+        return self.on_part[:, : len(self.on_part)]
+
+    def candidates(self, count: int) -> Candidates:
+        """Return, for each of the first samples, the `count` points of the grid with the nearest descriptors."""
+        best = np.argsort(self.unlike[: len(self.on_part)], axis=1, kind="stable")[:, :count]
+        rows = np.repeat(np.arange(len(best)), best.shape[1])
+        return Candidates(rows, best.ravel(), self.unlike[rows, best.ravel()])
+
+    def payoff(self, matches: Candidates, kernel_width: float) -> FloatArray:
+        """Return the (n, n) two-sided payoff; see `nonrigid.formulations.distortion.consistency`."""
+        excess = self.on_part[np.ix_(matches.part, matches.part)]
+        excess -= self.on_full[np.ix_(matches.full, matches.full)]
+        payoff = np.exp(np.square(excess, out=excess) * (-np.log(2.0) / kernel_width**2))
+        payoff[matches.conflicts()] = 0.0
+        return np.asarray(0.5 * (payoff + payoff.T))
+
+    def placed(self, rows: IntArray, images: IntArray, *, reach: float, descriptor_weight: float) -> IntArray:
+        """Return, for every sample of the part, the point of the grid where its distances to anchors place it.
+
+        It is the y with the least sum_a w_a(x) (d(x, a) - D(y, a'))^2 / sum_a w_a(x) + descriptor_weight * unlike(x, y)
+        with w_a(x) = exp(-((d(x, a) - min_b d(x, b)) / reach)^2): near anchors count most, because long distances are
+        those a cut disturbs.
+
+        Parameters
+        ----------
+        rows, images
+            (a,) anchors: samples of the part, among the first s, and their images.
+
+        Returns
+        -------
+        (p,) rows of the grid.
+        """
+        on_part, on_full = self.on_part[rows], self.on_full[images]
+        weight = np.exp(-np.square((on_part - on_part.min(axis=0)) / reach))
+        weight /= weight.sum(axis=0)
+        cost = weight.T @ on_full**2 - 2.0 * (weight * on_part).T @ on_full + descriptor_weight * self.unlike
+        return np.asarray(cost.argmin(axis=1), dtype=np.int64)
+
+    def disagreement(self, images: IntArray) -> FloatArray:
+        """Return, for the first s samples, the mean |d - D| to the others, near ones counting most: a length."""
+        weight = np.exp(-np.square(self.between / NEAR))
+        np.fill_diagonal(weight, 0.0)
+        image = images[: len(weight)]
+        off = np.abs(self.between - self.on_full[np.ix_(image, image)])
+        return np.asarray((weight * off).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-300))
+
+    def confidence(self, pair: Pair, nearest: IntArray, *, width: float) -> FloatArray:
+        """Return how well a map of all vertices keeps distances, 0 to 1: 1/2 where they are off by `width` on average.
+
+        The mean is over the first s samples, near ones counting most; images are rounded to the grid.
+
+        Parameters
+        ----------
+        nearest
+            (n,) for each vertex of the part one of the full surface.
+        """
+        places = pair.full.mesh.vertices
+        image = cKDTree(places[self.grid]).query(places[nearest])[1]
+        on_part = pair.part.distances(self.points[: len(self.on_part)])
+        weight = np.exp(-np.square(on_part / NEAR))
+        off = np.abs(on_part - self.on_full[np.ix_(image[self.points[: len(self.on_part)]], image)])
+        mean = (weight * off).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-300)
+        return np.asarray(np.exp(-np.log(2.0) * np.square(mean / width)))
+
+    def surest(self, images: IntArray, share: float) -> IntArray:
+        """Return which of the first s samples agree best with their neighbours, a given share of them."""
+        off = self.disagreement(images)
+        return np.flatnonzero(off <= np.quantile(off, share))
+
+
+def sampled_distances(
+    pair: Pair, descriptors: TrustedDescriptors, *, part_samples: int, placed_samples: int, full_samples: int
+) -> SampledDistances:
+    """Sample both surfaces and measure; a surface with too few vertices gives all of them.
+
+    The distances of the full surface depend on nothing else and are kept in the cache; so are those from the first
+    `part_samples` samples of the part.
+    """
+    part, full = pair.part, pair.full
+    points = part.samples(min(max(part_samples, placed_samples), len(part.mesh.vertices)))
+    grid = full.samples(min(full_samples, len(full.mesh.vertices)))
+    return SampledDistances(
+        points=points,
+        grid=grid,
+        on_part=part.distances(points[:part_samples])[:, points],
+        on_full=full.distances_between(grid),
+        unlike=descriptors.differences(points, grid),
+    )

@@ -1,0 +1,121 @@
+"""From a rough map of some points to a fine one: functional maps of growing size, fitted and read off in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+
+import numpy as np
+
+from nonrigid.formulations.formulation import Pair, Solved
+from nonrigid.formulations.functional_maps import estimated_rank
+from nonrigid.formulations.model import Problem, Variable, maximize
+from nonrigid.formulations.model.stiefel import Stiefel
+from nonrigid.formulations.model.terms.linear import Linear
+from nonrigid.formulations.trusted_descriptors import TrustedDescriptors
+from nonrigid.geometry.arrays import FloatArray, IntArray
+from nonrigid.geometry.maps import nearest_rows
+
+RANK_AT = 100
+"""Number of eigenvalues of the full surface by which the part's share of the spectrum is estimated."""
+
+
+@dataclass(frozen=True, eq=False)
+class Bases:
+    """Hold the eigenfunctions of both surfaces and their descriptors.
+
+    Parameters
+    ----------
+    part, full
+        (n, .) eigenfunctions, in 1 / sqrt(full area).
+    share
+        Eigenfunctions of the part to one of the full surface.
+    descriptors
+        Descriptors, with the trust in the part's.
+    descriptor_weight
+        Squared distance, in units of the full area, that a squared difference 1 of descriptors is worth.
+    """
+
+    part: FloatArray
+    full: FloatArray
+    share: float
+    descriptors: TrustedDescriptors
+    descriptor_weight: float
+
+    def part_size(self, size: int) -> int:
+        """Return how many eigenfunctions of the part go with `size` of the full surface."""
+        return int(np.clip(round(self.share * size), 1, min(self.part.shape[1], size)))
+
+    def sizes(self, first: int, steps: int) -> IntArray:
+        """Return growing numbers of eigenfunctions of the full surface, up to all that have counterparts at hand.
+
+        `first` is that of the part at the start, where its eigenfunctions can just tell its limbs apart.
+        """
+        last = int(min(self.full.shape[1], self.part.shape[1] / self.share))
+        return np.linspace(min(first / self.share, last), last, steps).round().astype(np.int64)
+
+    def features(self, C: FloatArray, points: IntArray | slice) -> tuple[FloatArray, FloatArray]:
+        """Return rows for points of the part and for the full surface's vertices, near where the two are the same.
+
+        Near by, |phi(y) - phi(y')|^2 over k eigenfunctions is about pi k^2 |y - y'|^2 by Weyl's law (area 1): this is
+        the scale at which descriptors stand beside them.
+        """
+        size = len(C)
+        weight = np.pi * size**2 * self.descriptor_weight
+        queries = np.hstack([self.part[points, : C.shape[1]] @ C.T, weight * self.descriptors.queries(points)])
+        return queries, np.hstack([self.full[:, :size], self.descriptors.targets()])
+
+
+def bases(
+    pair: Pair, descriptors: TrustedDescriptors, *, part_size: int, full_size: int, descriptor_weight: float
+) -> Bases:
+    """Return the bases of a pair; a surface with too few vertices gives as many eigenfunctions as it has."""
+    part = pair.part.spectrum(min(part_size, len(pair.part.mesh.vertices) - 1))
+    full = pair.full.spectrum(min(full_size, len(pair.full.mesh.vertices) - 1))
+    reference = min(RANK_AT, len(full.eigenvalues))
+    rank = estimated_rank(part.eigenvalues, full.eigenvalues[:reference])
+    return Bases(part.eigenfunctions, full.eigenfunctions, max(rank, 1) / reference, descriptors, descriptor_weight)
+
+
+def map_fit(name: str, rough: FloatArray) -> Problem:
+    """Return the problem of the functional map with orthonormal columns nearest to a rough one.
+
+    Minimizing |C - D|^2 over C'C = I is maximizing <D, C>, since |C| is constant there.
+
+    Examples
+    --------
+    >>> print(map_fit("map", np.eye(3, 2)))
+    map: maximize Linear(C)
+      subject to C in Stiefel()
+      with C of shape (3, 2)
+    """
+    C = Variable("C", rough.shape)
+    return Problem(name, maximize(Linear(rough)(C)), C @ Stiefel())
+
+
+def grown(
+    basis: Bases, points: IntArray, images: IntArray, sizes: IntArray
+) -> Generator[Problem, Solved, tuple[FloatArray, IntArray]]:
+    """Fit a functional map to matches and read better matches off it, with ever more eigenfunctions.
+
+    Parameters
+    ----------
+    points, images
+        (p,) vertices of the part, spread evenly, and the vertices of the full surface that they start at.
+    sizes
+        Numbers of eigenfunctions of the full surface, rising.
+
+    Returns
+    -------
+    The last map, (sizes[-1], .), and the (p,) images read off it.
+
+    Source: Melzi, Ren, Rodola, Sharma, Wonka and Ovsjanikov, ZoomOut (SIGGRAPH Asia 2019), here from part to whole,
+    with orthonormal maps and with descriptors beside the eigenfunctions.
+    """
+    for size in sizes:
+        part = basis.part[points, : basis.part_size(int(size))]
+        rough = np.linalg.lstsq(part, basis.full[images, :size], rcond=None)[0].T
+        solution = yield map_fit("map", rough)
+        C = solution["C"]
+        images = nearest_rows(*basis.features(C, points))[0]
+    return C, images
