@@ -10,7 +10,13 @@ import numpy as np
 
 from nonrigid.formulations.candidates import describe
 from nonrigid.formulations.formulation import Correspondence, Pair, Solved, Stages
-from nonrigid.formulations.functional_maps import estimated_rank, matched_rows, slanted_mask, spectral_closest_points
+from nonrigid.formulations.functional_maps import (
+    diagonal_start,
+    estimated_rank,
+    matched_rows,
+    slanted_mask,
+    spectral_closest_points,
+)
 from nonrigid.formulations.game_theoretic import GameTheoretic
 from nonrigid.formulations.model import Problem, Variable, free, minimize
 from nonrigid.formulations.model.terms.area_gap import AreaGap
@@ -47,8 +53,8 @@ class PartialFunctionalMap:
     radii
         Radii of the SHOT descriptors, in units of sqrt(full area).
     start
-        "mask": C is large where W is small, as published. "anchors": no descriptors, landmarks alone, from the matches
-        of `GameTheoretic`.
+        "mask": C is large where W is small, as published but for its scale; see `diagonal_start`. "anchors": the first
+        run uses landmarks instead of descriptors, the matches of `GameTheoretic`.
     mask_weight, orthogonality_weight, area_weight, edge_weight
         Weights for a full surface of area 1. The published ones, 1, 1e3, 1 and 1e2, hold for an area of about 1.75e4:
         lengths there are 132 times longer, and the terms change as its powers 0, 0, 4 and 1, the data as its power 1.
@@ -96,8 +102,7 @@ class PartialFunctionalMap:
             if getattr(self, name) < 1:
                 raise InputError(f"{name} is {getattr(self, name)}", remedy="give a number of at least 1")
         bases = Bases.of(pair, self.eigenfunctions, self.closest_point_samples)
-        mask = slanted_mask(bases.size, bases.rank)
-        C = (mask.max() - mask) / mask.max() if mask.max() > 0.0 else np.ones_like(mask)
+        C = diagonal_start(slanted_mask(bases.size, bases.rank), bases.rank)
         if self.start == "anchors":
             anchors = yield from GameTheoretic().stages(pair)
             descriptors = self._near(pair, *_vertices(pair, anchors))

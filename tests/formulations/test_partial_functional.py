@@ -170,7 +170,7 @@ def test_the_joint_energy_falls_with_every_block(pair: Pair) -> None:
     assert energies[-1] < 1e-3 * energies[0]
 
 
-@pytest.mark.parametrize("backend", ["native", {"C": "nlopt:LD_LBFGS", "v": "scipy:L-BFGS-B"}])
+@pytest.mark.parametrize("backend", ["native", {"C": "nlopt:LD_LBFGS", "v": "nlopt:LD_LBFGS"}])
 def test_a_cut_tube_is_found_again(backend: str | dict[str, str]) -> None:
     whole = bumpy()
     part, truth = cut(whole, 2.7)
