@@ -2,20 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Generator
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from nonrigid.formulations.formulation import Correspondence, Pair, Stages
+from nonrigid.formulations.formulation import Correspondence, Pair, Solved, Stages
 from nonrigid.formulations.games import game
 from nonrigid.formulations.interpolation import closest_feature_points
-from nonrigid.formulations.model import ElasticNet
-from nonrigid.formulations.sampled_distances import sampled_distances
+from nonrigid.formulations.model import ElasticNet, Problem
+from nonrigid.formulations.sampled_distances import SampledDistances, sampled_distances
 from nonrigid.formulations.spectral_growth import bases, grown
 from nonrigid.formulations.trusted_descriptors import trusted_descriptors
+from nonrigid.geometry.arrays import IntArray
 from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.maps import nearest_rows
+
+KEEPING = 0.03
+"""Mean change of distances, in units of sqrt(full area), at which a match has confidence 1/2."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """Hold the factors by which one start differs from the settings: shapes differ in which start fails."""
+
+    mix: float = 1.0
+    kernel_width: float = 1.0
+    placing_weight: float = 1.0
+
+
+STARTS = (Start(), Start(kernel_width=1.6, placing_weight=3.0), Start(mix=0.0), Start(placing_weight=3.0))
+"""Starts in the order in which they are tried."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +70,9 @@ class Anchored:
         Samples of the part to which functional maps are fitted.
     first_size, steps
         Eigenfunctions of the part in the first map, and number of maps.
+    starts, enough
+        Largest number of starts, and the mean confidence at which no other is tried; the one with the highest mean
+        confidence wins.
     part_size, full_size
         Largest numbers of eigenfunctions.
 
@@ -62,7 +83,7 @@ class Anchored:
     """
 
     radii: tuple[float, ...] = (0.04, 0.10)
-    trust_power: float = 2.0
+    trust_power: float = 1.0
     part_samples: int = 300
     full_samples: int = 1500
     per_sample: int = 10
@@ -73,11 +94,13 @@ class Anchored:
     local_reach: float = 0.12
     rounds: int = 3
     kept: float = 0.6
-    placing_weight: float = 0.015
+    placing_weight: float = 0.03
     growing_weight: float = 0.004
     fitted_samples: int = 1000
     first_size: int = 20
     steps: int = 5
+    starts: int = 4
+    enough: float = 0.75
     part_size: int = 100
     full_size: int = 200
 
@@ -85,8 +108,9 @@ class Anchored:
 
     def stages(self, pair: Pair) -> Stages:
         """State the game, then one map a step; return one point a vertex of the part."""
-        if self.steps < 1:
-            raise InputError(f"steps is {self.steps}", remedy="fit one functional map at least")
+        for name, value, most in (("steps", self.steps, 1000), ("starts", self.starts, len(STARTS))):
+            if not 1 <= value <= most:
+                raise InputError(f"{name} is {value}", remedy=f"give a number from 1 to {most}")
         descriptors = trusted_descriptors(pair, self.radii, power=self.trust_power)
         samples = sampled_distances(
             pair,
@@ -95,22 +119,37 @@ class Anchored:
             placed_samples=self.fitted_samples,
             full_samples=self.full_samples,
         )
-        matches = samples.candidates(self.per_sample)
-        share = (yield game("game", samples.payoff(matches, self.kernel_width), ElasticNet(mix=self.mix)))["u"]
-        anchors = matches[matches.greedy(share, floor=self.floor)]
-        images = samples.placed(anchors.part, anchors.full, reach=self.reach, descriptor_weight=self.placing_weight)
-        for _ in range(self.rounds):
-            sure = samples.surest(images, self.kept)
-            images = samples.placed(sure, images[sure], reach=self.local_reach, descriptor_weight=self.placing_weight)
         basis = bases(
             pair, descriptors, part_size=self.part_size, full_size=self.full_size, descriptor_weight=self.growing_weight
         )
-        sizes = basis.sizes(self.first_size, self.steps)
-        C, _ = yield from grown(basis, samples.points, samples.grid[images], sizes)
+        best, C = -1.0, np.empty((0, 0))
+        for start in STARTS[: self.starts]:
+            rows = yield from self._anchored(samples, start)
+            grew, images = yield from grown(
+                basis, samples.points, samples.grid[rows], basis.sizes(self.first_size, self.steps)
+            )
+            score = float(samples.confidence(pair, samples.points, images, width=KEEPING).mean())
+            if score > best:
+                best, C = score, grew
+            if best >= self.enough:
+                break
         queries, features = basis.features(C, slice(None))
         nearest = nearest_rows(queries, features)[0]
         found = closest_feature_points(queries, features, pair.full.mesh, nearest)
         # Where the repair split a vertex in several, its first copy speaks for it.
         raw, first = np.unique(pair.part.clean_view.raw_of_vertex, return_index=True)
-        confidence = samples.confidence(pair, nearest, width=self.kernel_width)
+        confidence = samples.confidence(pair, np.arange(len(nearest)), nearest, width=KEEPING)
         return Correspondence(raw, pair.full.clean_view.to_raw(found)[first], confidence[first])
+
+    def _anchored(self, samples: SampledDistances, start: Start) -> Generator[Problem, Solved, IntArray]:
+        """Play one game, and place the samples by its winners and then by one another."""
+        matches = samples.candidates(self.per_sample)
+        payoff = samples.payoff(matches, self.kernel_width * start.kernel_width)
+        share = (yield game("game", payoff, ElasticNet(mix=self.mix * start.mix)))["u"]
+        anchors = matches[matches.greedy(share, floor=self.floor)]
+        weight = self.placing_weight * start.placing_weight
+        images = samples.placed(anchors.part, anchors.full, reach=self.reach, descriptor_weight=weight)
+        for _ in range(self.rounds):
+            sure = samples.surest(images, self.kept)
+            images = samples.placed(sure, images[sure], reach=self.local_reach, descriptor_weight=weight)
+        return images

@@ -89,21 +89,23 @@ class SampledDistances:
         off = np.abs(self.between - self.on_full[np.ix_(image, image)])
         return np.asarray((weight * off).sum(axis=1) / np.maximum(weight.sum(axis=1), 1e-300))
 
-    def confidence(self, pair: Pair, nearest: IntArray, *, width: float) -> FloatArray:
-        """Return how well a map of all vertices keeps distances, 0 to 1: 1/2 where they are off by `width` on average.
+    def confidence(self, pair: Pair, vertices: IntArray, nearest: IntArray, *, width: float) -> FloatArray:
+        """Return how well a map keeps distances, 0 to 1: 1/2 where they are off by `width` on average.
 
         The mean is over the first s samples, near ones counting most; images are rounded to the grid.
 
         Parameters
         ----------
-        nearest
-            (n,) for each vertex of the part one of the full surface.
+        vertices, nearest
+            (n,) vertices of the part, the first s samples among them, and a vertex of the full surface for each.
         """
-        places = pair.full.mesh.vertices
-        image = cKDTree(places[self.grid]).query(places[nearest])[1]
-        on_part = pair.part.distances(self.points[: len(self.on_part)])
+        samples, places = self.points[: len(self.on_part)], pair.full.mesh.vertices
+        image = np.asarray(cKDTree(places[self.grid]).query(places[nearest])[1], dtype=np.int64)
+        row = np.empty(len(pair.part.mesh.vertices), dtype=np.int64)
+        row[vertices] = np.arange(len(vertices))
+        on_part = pair.part.distances(samples)[:, vertices]
         weight = np.exp(-np.square(on_part / NEAR))
-        off = np.abs(on_part - self.on_full[np.ix_(image[self.points[: len(self.on_part)]], image)])
+        off = np.abs(on_part - self.on_full[np.ix_(image[row[samples]], image)])
         mean = (weight * off).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-300)
         return np.asarray(np.exp(-np.log(2.0) * np.square(mean / width)))
 

@@ -114,7 +114,7 @@ def grown(
     """
     for size in sizes:
         part = basis.part[points, : basis.part_size(int(size))]
-        rough = np.linalg.lstsq(part, basis.full[images, :size], rcond=None)[0].T
+        rough = np.asarray(np.linalg.lstsq(part, basis.full[images, :size], rcond=None)[0].T, dtype=np.float64)
         solution = yield map_fit("map", rough)
         C = solution["C"]
         images = nearest_rows(*basis.features(C, points))[0]

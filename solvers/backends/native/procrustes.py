@@ -34,6 +34,6 @@ def procrustes(oracle: Oracle, start: FloatArray, limits: Limits) -> tuple[Float
     """
     gain = procrustes_gain(oracle.problem)
     assert not isinstance(gain, str)
-    best = oracle.problem.memberships[0].set.linear_max(gain).ravel()
+    best = Stiefel().linear_max(gain).ravel()
     oracle.value_and_gradient(best)
     return best, "closed form by singular values"

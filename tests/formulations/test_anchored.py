@@ -1,0 +1,102 @@
+"""Anchored matching: its closed form is the optimum, points between vertices, and invariance of the whole method."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import ortho_group
+
+from nonrigid.benchmark.datasets.creatures import Creatures
+from nonrigid.benchmark.datasets.protocols import PairData
+from nonrigid.benchmark.datasets.shrec16 import Shrec16
+from nonrigid.benchmark.protocol import random_rigid_motion, score
+from nonrigid.formulations.anchored import Anchored
+from nonrigid.formulations.formulation import Correspondence, Pair
+from nonrigid.formulations.interpolation import closest_feature_points
+from nonrigid.formulations.spectral_growth import map_fit
+from nonrigid.geometry.mesh import Mesh
+from nonrigid.solvers.match import match
+from nonrigid.solvers.solve import solve
+
+SMALL = Anchored(
+    radii=(0.08, 0.15), part_samples=200, full_samples=700, fitted_samples=400, part_size=60, full_size=120, starts=2
+)
+"""Settings for meshes of 1,500 vertices, in whose triangles small SHOT balls find too few neighbours."""
+
+
+@pytest.fixture(scope="module")
+def creature() -> PairData:
+    specs = Creatures(vertices=1500).pairs()
+    return next(spec for spec in specs if spec.split == "cuts").load()
+
+
+def found(data: PairData, part: Mesh, full: Mesh, method: Anchored = SMALL) -> Correspondence:
+    matched = match(Pair.of(part, full), method).correspondence
+    assert matched is not None
+    return matched
+
+
+@pytest.fixture(scope="module")
+def matched(creature: PairData) -> Correspondence:
+    return found(creature, random_rigid_motion(creature.part)[0], creature.full)
+
+
+@pytest.mark.parametrize("backend", ["native", "casadi:ipopt", "nlopt:LD_SLSQP", "scipy:SLSQP"])
+def test_every_backend_reaches_the_closed_form_of_the_map_fit(backend: str) -> None:
+    rough = np.random.default_rng(0).standard_normal((6, 4))
+    solution = solve(map_fit("map", rough), backend)
+    # The maximum of <K, C> over C'C = I is the sum of the singular values of K.
+    assert solution.objective == pytest.approx(np.linalg.svd(rough, compute_uv=False).sum(), rel=1e-6)
+    assert solution.violation <= 1e-7
+
+
+def test_the_map_fit_recovers_an_orthonormal_map() -> None:
+    true = ortho_group.rvs(7, random_state=1)[:, :4]
+    solution = solve(map_fit("map", 3.0 * true))
+    assert solution.status.value == "stationary"
+    np.testing.assert_allclose(solution["C"], true, atol=1e-12)
+
+
+def test_points_of_the_surface_are_found_in_its_own_coordinates(creature: PairData) -> None:
+    full = creature.full
+    rng = np.random.default_rng(0)
+    faces = rng.integers(0, len(full.faces), 200)
+    places = np.einsum("pc,pcx->px", rng.dirichlet(np.ones(3), 200), full.vertices[full.faces[faces]])
+    corner = full.faces[faces, 0]
+    points = closest_feature_points(places, full.vertices, full, corner)
+    np.testing.assert_allclose(points.positions(full), places, atol=1e-9 * np.sqrt(full.area))
+
+
+def test_every_vertex_of_a_creature_is_matched_well(creature: PairData, matched: Correspondence) -> None:
+    result = score(creature, matched.dense(len(creature.part.vertices)))
+    assert result.unmatched_count == 0
+    assert result.mean_error < 0.04
+    assert np.ptp(matched.confidence) > 0.0
+    assert 0.0 <= matched.confidence.min() <= matched.confidence.max() <= 1.0
+
+
+def test_order_frame_and_scale_change_nothing(creature: PairData, matched: Correspondence) -> None:
+    rng = np.random.default_rng(3)
+    part, full = random_rigid_motion(creature.part)[0], creature.full
+    for mesh_of, scale in ((random_rigid_motion(creature.part, 5)[0], 0.01), (part, 100.0)):
+        order, target = rng.permutation(len(part.vertices)), rng.permutation(len(full.vertices))
+        moved = Mesh(mesh_of.vertices[order] * scale, np.argsort(order)[part.faces])
+        whole = random_rigid_motion(full, 7)[0]
+        whole = Mesh(whole.vertices[target] * scale, np.argsort(target)[full.faces])
+        again = found(creature, moved, whole)
+        back = np.empty((len(part.vertices), 3))
+        back[order[again.part_vertices]] = again.points.positions(Mesh(full.vertices[target], whole.faces))
+        before = matched.dense(len(part.vertices)).positions(full)
+        apart = np.linalg.norm(back - before, axis=1) / np.sqrt(full.area)
+        assert np.quantile(apart, 0.99) < 1e-3
+
+
+@pytest.mark.realdata
+def test_a_real_cut_is_matched_at_every_vertex(data: Path) -> None:
+    pair = Shrec16(root=data, names=("cuts_wolf_shape_2",)).pairs()[0].load()
+    matched = found(pair, random_rigid_motion(pair.part)[0], pair.full, Anchored())
+    result = score(pair, matched.dense(len(pair.part.vertices)))
+    assert result.unmatched_count == 0
+    assert result.mean_error < 0.02
