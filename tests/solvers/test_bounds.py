@@ -156,4 +156,4 @@ def test_what_cannot_be_bounded_says_why() -> None:
         bound(bowl, "magic")
     with pytest.raises(InputError):
         bound(bowl, seconds=0)
-    assert set(bound_methods()) == set(ON_SIMPLEX)
+    assert set(ON_SIMPLEX) <= set(bound_methods())

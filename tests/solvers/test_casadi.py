@@ -282,4 +282,4 @@ def test_mixed_binary_set_and_linear_term_keep_their_promises() -> None:
     assert not term.column(0).any()
     assert term.latex(["x"]) == r"c^\top x"
     with pytest.raises(ModelError, match="finite vector"):
-        Linear(np.ones((2, 2)))
+        Linear(np.ones((2, 2, 2)))
