@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from nonrigid.formulations.model import Problem, Sense
+from nonrigid.formulations.model.binary_sets import integral_entries
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.acceptance import Claim, Refused, Rewritten, Via
 from nonrigid.solvers.backend import Backend, Raw
@@ -45,7 +46,7 @@ def solve_once(
     seconds, evaluations = oracle.seconds, oracle.evaluations
     judged, error = _measured(problem, rewritten, oracle, raw)
     # A failing term is the cause, what the library then says of it the consequence.
-    status, message = _decide(judged, limits, oracle, oracle.failure or failure or error)
+    status, message = _decide(problem, judged, limits, oracle, oracle.failure or failure or error)
     claims = [bridge.claim for bridge in bridges if bridge.claim is not Claim.EXACT]
     solution = head.solution(
         status,
@@ -164,7 +165,9 @@ def _returned(x: FloatArray | None, oracle: Oracle, rewritten: Rewritten) -> Val
     return rewritten.inverse(oracle.layout.split(last))
 
 
-def _decide(judged: Judgement | None, limits: Limits, oracle: Oracle, failure: Exception | None) -> tuple[Status, str]:
+def _decide(
+    problem: Problem, judged: Judgement | None, limits: Limits, oracle: Oracle, failure: Exception | None
+) -> tuple[Status, str]:
     stop = oracle.interrupted
     if judged is None:
         if isinstance(stop, NotFiniteError):
@@ -175,15 +178,22 @@ def _decide(judged: Judgement | None, limits: Limits, oracle: Oracle, failure: E
         return Status.BACKEND_ERROR, f"{words}; {Status.BACKEND_ERROR.advice}"
     if judged.violation > limits.feasibility:
         return Status.INFEASIBLE, f"violation {judged.violation:.2g}; {Status.INFEASIBLE.advice}"
-    if judged.stationarity <= limits.tolerance * max(1.0, abs(judged.objective)):
+    if not _has_integers(problem) and judged.stationarity <= limits.tolerance * max(1.0, abs(judged.objective)):
         return Status.STATIONARY, Status.STATIONARY.advice
     if isinstance(stop, NotFiniteError):
         return Status.NUMERICAL_ERROR, f"{stop}; {Status.NUMERICAL_ERROR.advice}"
     if isinstance(stop, LimitReached):
         return Status.LIMIT, f"{stop}; {Status.LIMIT.advice}"
+    if _has_integers(problem):  # the rounded point is an answer even where the relaxation's own solve ended badly
+        words = "" if failure is None else f"{_words(failure)}; "
+        return Status.FEASIBLE, f"{words}integers have no first-order test: ask for a bound, or a backend that branches"
     if failure is not None:
         return Status.BACKEND_ERROR, f"{_words(failure)}; {Status.BACKEND_ERROR.advice}"
     return Status.FEASIBLE, f"stationarity {judged.stationarity:.2g}; {Status.FEASIBLE.advice}"
+
+
+def _has_integers(problem: Problem) -> bool:
+    return any(integral_entries(m.set, m.variable.shape).any() for m in problem.memberships)
 
 
 def _words(failure: Exception) -> str:
