@@ -21,10 +21,13 @@ class OnRays:
     surface: Any
 
     def value_and_gradient(self, *y: FloatArray) -> tuple[float, FloatArray]:
-        """Return f(y / g) and its gradient (f' - (f'x) g') / g, with g the gauge of y and x = y / g."""
+        """Return f(y / g) and its gradient (f' - (f'x) g') / g, with g the gauge of y and x = y / g.
+
+        The origin, which lies on every ray, stands for the surface's center, as it does on the way back.
+        """
         gauge, normal = self.surface.gauge_and_gradient(y[0])
         if gauge <= 0.0:
-            return float("nan"), np.full_like(y[0], np.nan)
+            return self.term.value_and_gradient(self.surface.center(y[0].shape))[0], np.zeros_like(y[0])
         x = y[0] / gauge
         value, gradient = self.term.value_and_gradient(x)
         return value, (gradient - float(gradient @ x) * normal) / gauge

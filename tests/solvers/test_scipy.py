@@ -8,6 +8,7 @@ import pytest
 from nonrigid.formulations.model import Problem, QuadraticForm, Simplex, SmoothConstraint, Variable, maximize
 from nonrigid.solvers.acceptance import Refused
 from nonrigid.solvers.backends.scipy import Scipy
+from nonrigid.solvers.bridges.radial import OnRays
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.solve import solve
 from nonrigid.solvers.status import Status
@@ -82,3 +83,10 @@ def test_a_solution_is_reported_through_both_variables() -> None:
     assert found.algorithm == "SLSQP"
     for name, value in instance.values.items():
         np.testing.assert_allclose(found[name], value, atol=1e-6)
+
+
+def test_the_origin_of_the_rays_stands_for_the_center() -> None:
+    payoff = QuadraticForm(1.0 - np.eye(3))
+    value, gradient = OnRays(payoff, Simplex()).value_and_gradient(np.zeros(3))
+    assert value == pytest.approx(payoff.value_and_gradient(np.full(3, 1.0 / 3.0))[0])
+    assert not gradient.any()
