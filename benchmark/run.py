@@ -14,13 +14,13 @@ from nonrigid.benchmark.choices import backend_words, guarded, parse_backend
 from nonrigid.benchmark.datasets.protocols import PairData
 from nonrigid.benchmark.environment import source_digest
 from nonrigid.benchmark.formats import write_corr
-from nonrigid.benchmark.protocol import score
+from nonrigid.benchmark.matched_points import matched_points, write_points
+from nonrigid.benchmark.protocol import Score, score
 from nonrigid.benchmark.store import Record, Store
 from nonrigid.formulations.formulation import Formulation, Pair, Stages
 from nonrigid.formulations.model import Problem
 from nonrigid.geometry.cache import content_hash
 from nonrigid.geometry.errors import NonrigidError
-from nonrigid.geometry.points import SurfacePoints
 from nonrigid.solvers.backend import backend_class
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.match import match
@@ -95,8 +95,12 @@ def do_run(run: Run, data: PairData, pair: Pair, store: Store) -> Record:
         if found.correspondence is not None:
             points = found.correspondence.dense(len(data.part.vertices))
             write_corr(store.match_file(run.id), points)
+            errors = None
             if data.truth is not None:
-                record |= _scored(data, points, run.metric)
+                result = score(data, points, geodesics=run.metric)
+                errors = result.errors
+                record |= _scored(result)
+            write_points(store.points_file(run.id), matched_points(points, errors, found.solutions))
     except Exception as failure:
         # A method or library of a third party may raise anything; the row says so, and the benchmark goes on.
         record |= _failed(failure)
@@ -197,8 +201,7 @@ def _stage(solution: Solution, seen: tuple[int, str | None]) -> Record:
     }
 
 
-def _scored(data: PairData, points: SurfacePoints, metric: str) -> Record:
-    result = score(data, points, geodesics=metric)
+def _scored(result: Score) -> Record:
     return {
         "mean_error": result.mean_error,
         "mean_error_per_point": result.mean_error_per_point,

@@ -44,7 +44,7 @@ class Store:
     ----------
     folder
         Holds `plan.toml`, `environment.json`, `index.json` (what the plan asks for), `runs/<id>.json`,
-        `matches/<id>.corr` and, once complete, `runs.parquet`.
+        `matches/<id>.corr`, `matches/<id>.npz` and, once complete, `runs.parquet`.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -65,6 +65,10 @@ class Store:
     def match_file(self, run: str) -> Path:
         """Return where the correspondence of a run is kept."""
         return self.matches / f"{run}.corr"
+
+    def points_file(self, run: str) -> Path:
+        """Return where a run's matches are kept with their errors; see `nonrigid.benchmark.matched_points`."""
+        return self.matches / f"{run}.npz"
 
     def has(self, run: str) -> bool:
         """Tell whether a run is finished."""
