@@ -98,12 +98,12 @@ def clean(mesh: Mesh) -> CleanMesh:
     ('dropped 1 face that names a vertex twice', 'reversed 1 face', 'dropped 1 vertex without a face')
     """
     if not mesh.area > 0:
-        raise InputError("the total area is zero", file=mesh.name, remedy="check the unit and the faces of the mesh")
+        raise InputError("the total area is zero", file=mesh.source, remedy="check the unit and the faces of the mesh")
     repairs: list[str] = []
     kept = _without_repeated_corners(mesh.faces, repairs)
     kept = kept[_without_doubles(mesh.faces[kept], repairs)]
     if not len(kept):
-        raise InputError(f"no face is left: {'; '.join(repairs)}", file=mesh.name, remedy="export the mesh again")
+        raise InputError(f"no face is left: {'; '.join(repairs)}", file=mesh.source, remedy="export the mesh again")
 
     raw_faces = mesh.faces[kept]
     oriented = np.asarray(igl.bfs_orient(raw_faces)[0], dtype=np.int64)
@@ -125,7 +125,7 @@ def clean(mesh: Mesh) -> CleanMesh:
     vertex_of_raw[raw_of_vertex[::-1]] = np.arange(len(raw_of_vertex))[::-1]
     _describe_vertices(vertex_of_raw, raw_of_vertex, repairs)
     return CleanMesh(
-        mesh=Mesh(mesh.vertices[raw_of_vertex], faces, name=mesh.name),
+        mesh=Mesh(mesh.vertices[raw_of_vertex], faces, name=mesh.name, file=mesh.file),
         raw=mesh,
         vertex_of_raw=vertex_of_raw,
         raw_of_vertex=raw_of_vertex,
@@ -180,7 +180,7 @@ def _largest_piece(mesh: Mesh, faces: IntArray, kept: IntArray, raw_of_copy: Int
         raise InputError(
             f"the surface falls into {len(areas)} pieces without a common edge, {(~pinched).sum()} of them without a"
             f" common vertex with the largest, with {listed} of the area{hint}",
-            file=mesh.name,
+            file=mesh.source,
             remedy="keep one piece, or merge vertices that lie in the same place",
         )
     repairs.append(

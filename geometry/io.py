@@ -14,13 +14,14 @@ import trimesh
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.mesh import Mesh
+from nonrigid.geometry.tosca_forms import read_mat, read_vert_tri
 
 _Row = tuple[int, str]
 """A line's 1-based number in its file, and its text without comments."""
 
 
 def read_mesh(path: str | PathLike[str]) -> Mesh:
-    """Read a triangle mesh from an OFF, OBJ or PLY file, chosen by its suffix.
+    """Read a triangle mesh from an OFF, OBJ, PLY, TOSCA `.mat` or `.vert` (with its `.tri`) file, chosen by its suffix.
 
     Vertices and faces keep the order and the numbers of the file: nothing is merged, split, dropped or triangulated,
     because ground truth refers to these numbers. Unreferenced vertices stay. Colours, normals and texture coordinates
@@ -29,7 +30,7 @@ def read_mesh(path: str | PathLike[str]) -> Mesh:
     Returns
     -------
     Mesh
-        (n, 3) vertices in the file's unit, (m, 3) faces, named after the file without its suffix.
+        (n, 3) vertices in the file's unit, (m, 3) faces, named after the file without its suffix; `file` is the path.
 
     Raises
     ------
@@ -59,7 +60,7 @@ def read_mesh(path: str | PathLike[str]) -> Mesh:
         raise InputError("there is no such file", file=path, remedy="check the path")
     try:
         vertices, faces = reader(path)
-        return Mesh(vertices, faces, name=path.stem)
+        return Mesh(vertices, faces, name=path.stem, file=path)
     except InputError as error:
         raise error.at(path) from error
     except OSError as error:
@@ -238,4 +239,6 @@ _READERS: dict[str, Callable[[Path], tuple[FloatArray, IntArray]]] = {
     ".off": _read_off,
     ".obj": _read_obj,
     ".ply": _read_ply,
+    ".mat": read_mat,
+    ".vert": read_vert_tri,
 }

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from os import PathLike
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,6 +31,8 @@ class Mesh:
         (m, 3) vertex numbers, 0-based.
     name
         Shown in messages and tables; it changes no result.
+    file
+        The file it was read from, for messages; None where there is none.
 
     Raises
     ------
@@ -45,11 +49,20 @@ class Mesh:
     vertices: FloatArray
     faces: IntArray
     name: str = field(default="mesh", kw_only=True)
+    file: Path | None = field(default=None, kw_only=True)
 
-    def __init__(self, vertices: ArrayLike, faces: ArrayLike, *, name: str = "mesh") -> None:
+    def __init__(
+        self, vertices: ArrayLike, faces: ArrayLike, *, name: str = "mesh", file: str | PathLike[str] | None = None
+    ) -> None:
         object.__setattr__(self, "name", name)
+        object.__setattr__(self, "file", None if file is None else Path(file))
         object.__setattr__(self, "vertices", _checked_vertices(vertices))
         object.__setattr__(self, "faces", _checked_faces(faces, len(self.vertices)))
+
+    @property
+    def source(self) -> str:
+        """What messages call it: its file where it has one, else its name."""
+        return self.name if self.file is None else str(self.file)
 
     @cached_property
     def face_areas(self) -> FloatArray:
@@ -105,7 +118,7 @@ class Mesh:
     ) -> Mesh:
         """Return the mesh with vertices `scale * rotation @ v + translation`, faces and name unchanged."""
         turned = self.vertices if rotation is None else self.vertices @ np.asarray(rotation, dtype=float).T
-        return Mesh(scale * turned + np.asarray(translation, dtype=float), self.faces, name=self.name)
+        return Mesh(scale * turned + np.asarray(translation, dtype=float), self.faces, name=self.name, file=self.file)
 
     @cached_property
     def _cross(self) -> FloatArray:

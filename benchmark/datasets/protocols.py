@@ -7,14 +7,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol, TypeAlias, runtime_checkable
 
+from nonrigid.benchmark.datasets.files import FileSource, Member, exists, load_mesh, local_file
 from nonrigid.benchmark.formats import read_truth
 from nonrigid.geometry.errors import InputError
-from nonrigid.geometry.io import read_mesh
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.points import SurfacePoints
 
-MeshSource: TypeAlias = Path | Callable[[], Mesh]
-PointsSource: TypeAlias = Path | Callable[[], SurfacePoints]
+MeshSource: TypeAlias = FileSource | Callable[[], Mesh]
+PointsSource: TypeAlias = FileSource | Callable[[], SurfacePoints]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -30,7 +30,7 @@ class PairSpec:
     class_name
         The class whose full shape this is, such as "cat".
     part, full
-        Where the meshes come from: a file, or a picklable function without arguments.
+        Where the meshes come from: a file, a member of a zip archive, or a picklable function without arguments.
     truth, mirrored
         Where the ground truth comes from; None where the data set has none.
     source_pose
@@ -65,7 +65,7 @@ class PairSpec:
         """
         for role in ("part", "full", "truth", "mirrored"):
             source = getattr(self, role)
-            if isinstance(source, Path) and not source.is_file():
+            if isinstance(source, Path | Member) and not exists(source):
                 raise InputError(f"pair {self.name} lacks its {role} file", file=source, remedy="complete the data set")
         part, full = _mesh(self.part), _mesh(self.full)
         return PairData(
@@ -147,10 +147,11 @@ class Dataset(Protocol):
 
 
 def _mesh(source: MeshSource) -> Mesh:
-    return read_mesh(source) if isinstance(source, Path) else source()
+    return load_mesh(source) if isinstance(source, Path | Member) else source()
 
 
 def _points(source: PointsSource | None, part: Mesh, full: Mesh) -> SurfacePoints | None:
-    if isinstance(source, Path):
-        return read_truth(source, full, expected_rows=len(part.vertices))
+    if isinstance(source, Path | Member):
+        with local_file(source) as path:
+            return read_truth(path, full, expected_rows=len(part.vertices))
     return None if source is None else source()

@@ -95,7 +95,7 @@ HEAD = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n"
         ("a.obj", "v 0 0 0\nf 1 a 2\n", "row 2: not a triangle"),
         ("a.obj", "hello\n", "no OBJ"),
         ("a.ply", "OFF\n", "no PLY file"),
-        ("a.stl", "solid\n", "'.stl' is none of .obj, .off, .ply"),
+        ("a.stl", "solid\n", "'.stl' is none of .mat, .obj, .off, .ply, .vert"),
     ],
 )
 def test_bad_files_are_refused_naming_file_and_row(write: Write, name: str, text: str, complaint: str) -> None:
