@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nonrigid.geometry.arrays import FloatArray, IntArray
+from nonrigid.geometry.arrays import BoolArray, FloatArray, IntArray
 from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.points import SurfacePoints
@@ -59,6 +59,11 @@ def read_corr(path: Path | str, *, full: Mesh | None = None, expected_rows: int 
 def read_vts(path: Path | str, full: Mesh, *, expected_rows: int | None = None) -> SurfacePoints:
     """Read one vertex of `full` a row, counted from 1; raise `InputError` as `read_baryc` does."""
     return _vertices(Path(path), full, expected_rows, first=1)
+
+
+def read_vertices(path: Path | str, mesh: Mesh, *, expected_rows: int | None = None) -> IntArray:
+    """Return the (r,) 0-based vertices of `mesh` that the rows of a `.vts` file name; raise as `read_vts` does."""
+    return _numbers(Path(path), mesh, expected_rows, first=1)[0]
 
 
 def read_map(path: Path | str, full: Mesh, *, expected_rows: int | None = None) -> SurfacePoints:
@@ -165,13 +170,19 @@ def _weighted(path: Path, full: Mesh | None, expected_rows: int | None, *, unmat
 
 
 def _vertices(path: Path, full: Mesh, expected_rows: int | None, *, first: int) -> SurfacePoints:
+    vertex, none = _numbers(path, full, expected_rows, first=first)
+    try:
+        return SurfacePoints.at_vertices(full, np.where(none, -1, vertex))
+    except InputError as error:
+        raise error.at(path) from None
+
+
+def _numbers(path: Path, full: Mesh, expected_rows: int | None, *, first: int) -> tuple[IntArray, BoolArray]:
+    """Return the 0-based vertices that the rows name, and which rows say "unmatched"."""
     vertex = _whole_numbers(path, _table(path, 1, expected_rows)[:, 0], "vertex")
     none = (vertex == -1) if first == 0 else np.zeros(len(vertex), dtype=bool)
     _check_range(path, vertex, none, "vertex", first, len(full.vertices), full)
-    try:
-        return SurfacePoints.at_vertices(full, np.where(none, -1, vertex - first))
-    except InputError as error:
-        raise error.at(path) from None
+    return vertex - first, none
 
 
 def _table(path: Path, columns: int, expected_rows: int | None) -> FloatArray:
@@ -191,7 +202,8 @@ def _table(path: Path, columns: int, expected_rows: int | None) -> FloatArray:
         raise InputError(
             f"{len(rows)} rows, but the part has {expected_rows} vertices",
             file=path,
-            remedy="use the file that belongs to this part: one row a vertex",
+            remedy="use the file that belongs to this part, one row a vertex; files of training and test sets bear the"
+            " same names, and must not be mixed",
         )
     try:
         table = np.array(rows, dtype=np.float64).reshape(-1, columns)

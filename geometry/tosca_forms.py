@@ -28,7 +28,7 @@ def read_mat(path: Path) -> tuple[FloatArray, IntArray]:
     Source: A. Bronstein, M. Bronstein, R. Kimmel, "Numerical geometry of non-rigid shapes", 2008 (the TOSCA data set).
     """
     try:
-        content = loadmat(path, squeeze_me=True, struct_as_record=True)
+        content = loadmat(path, struct_as_record=True)
     # SciPy reports damage of all kinds: bad magic, zlib errors, sizes that do not fit, and version 7.3 files.
     except Exception as error:
         raise InputError(
@@ -42,7 +42,8 @@ def read_mat(path: Path) -> tuple[FloatArray, IntArray]:
             remedy="save the mesh as one structure `surface`",
         )
     x, y, z, triangles = (np.asarray(surfaces[0][field].item(), dtype=np.float64) for field in _FIELDS)
-    if not (x.ndim == 1 and x.shape == y.shape == z.shape and triangles.ndim == 2 and triangles.shape[1] == 3):
+    x, y, z = x.ravel(), y.ravel(), z.ravel()
+    if not (x.shape == y.shape == z.shape and triangles.ndim == 2 and triangles.shape[1] == 3):
         raise InputError(
             f"X, Y, Z, TRIV have the shapes {x.shape}, {y.shape}, {z.shape}, {triangles.shape}",
             file=path,
