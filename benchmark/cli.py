@@ -14,6 +14,7 @@ from nonrigid.benchmark.commands.bench import bench_command
 from nonrigid.benchmark.commands.cache import cache_command
 from nonrigid.benchmark.commands.cite import cite_command
 from nonrigid.benchmark.commands.match import match_command
+from nonrigid.benchmark.commands.merge import merge_command
 from nonrigid.benchmark.commands.report import report_command
 from nonrigid.benchmark.commands.score import score_command
 from nonrigid.benchmark.commands.solvers import solvers_command
@@ -67,6 +68,7 @@ app.command("match")(match_command)
 app.command("score")(score_command)
 app.command("solvers")(solvers_command)
 app.command("bench")(bench_command)
+app.command("merge")(merge_command)
 app.command("report")(report_command)
 app.command("cite")(cite_command)
 app.command("cache")(cache_command)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import os
 import platform
 import subprocess
@@ -11,6 +12,7 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from pathlib import Path
 
 import numpy as np
+import scipy.linalg
 from threadpoolctl import threadpool_info  # type: ignore[import-untyped]
 
 from nonrigid import benchmark, formulations, geometry, solvers
@@ -21,7 +23,7 @@ _ROOMS = (geometry, formulations, solvers, benchmark)
 
 def environment() -> dict[str, object]:
     """Return the environment as plain data: package, native solver and BLAS versions, CPU, state of the code."""
-    np.ones((2, 2)) @ np.ones((2, 2))  # BLAS libraries are listed once they are loaded
+    scipy.linalg.lu(np.ones((2, 2)) @ np.ones((2, 2)))  # BLAS libraries are listed once they are loaded
     return {
         "nonrigid": version("nonrigid"),
         "source": source_digest(),
@@ -35,8 +37,16 @@ def environment() -> dict[str, object]:
         "blas": [
             {key: pool.get(key) for key in ("internal_api", "version", "architecture", "num_threads")}
             for pool in threadpool_info()
+            if pool.get("user_api") == "blas"
         ],
     }
+
+
+@cache
+def known_environment() -> tuple[str, dict[str, object]]:
+    """Return a short word for this process's environment, and the environment, looked up once."""
+    found = environment()
+    return hashlib.sha256(json.dumps(found, sort_keys=True, default=str).encode()).hexdigest()[:12], found
 
 
 @cache

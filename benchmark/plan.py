@@ -13,15 +13,20 @@ from pathlib import Path
 from typing import Any
 
 from nonrigid.benchmark import datasets, plans
+from nonrigid.benchmark.accuracy import with_accuracy
 from nonrigid.benchmark.choices import parse_backend
 from nonrigid.benchmark.datasets.protocols import Dataset, PairSpec
 from nonrigid.benchmark.methods import make_method
 from nonrigid.benchmark.vertex_pairs import check_metric
 from nonrigid.formulations.formulation import Formulation
 from nonrigid.geometry.errors import InputError, NonrigidError, UnknownNameError
+from nonrigid.solvers.confine import can_limit_memory
 from nonrigid.solvers.limits import Limits
 
-_KEYS = ("title", "backends", "starts", "seed", "motion_seed", "metric", "data", "methods", "limits")
+_KEYS = (
+    *("title", "backends", "starts", "seed", "motion_seed", "metric", "data", "methods"),
+    *("limits", "run_seconds", "accuracy"),
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -35,7 +40,7 @@ class Entry:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Plan:
-    """Hold what a benchmark combines: every pair with every method and every backend.
+    """Hold what a benchmark combines: every pair with every method, every backend and every accuracy.
 
     Parameters
     ----------
@@ -47,6 +52,11 @@ class Plan:
         Words as `parse_backend` reads them.
     starts, seed, limits
         As in `nonrigid.solvers.match.match`, for every solve.
+    accuracy
+        Words of `nonrigid.benchmark.accuracy.PRESETS`, each of which sets the tolerances of `limits` for a run of its
+        own; where empty, those of `limits` hold.
+    run_seconds
+        Wall-clock time after which a whole run is killed, whatever it is doing; None for no bound.
     motion_seed
         Seed of the rigid motion of each part before it is matched; None leaves parts where their files have them.
     metric
@@ -65,6 +75,8 @@ class Plan:
     starts: int = 1
     seed: int = 0
     limits: Limits = field(default_factory=Limits)
+    accuracy: tuple[str, ...] = ()
+    run_seconds: float | None = 3600.0
     motion_seed: int | None = 0
     metric: str = "dijkstra"
     text: str = ""
@@ -83,6 +95,13 @@ class Plan:
             for spec in found.values()
             if (not self.names or spec.name in self.names) and (not self.splits or spec.split in self.splits)
         ]
+
+    def variants(self) -> list[tuple[str, Limits]]:
+        """Return the limits of each accuracy under the word that tells it apart in labels, empty where there is one."""
+        if not self.accuracy:
+            return [("", self.limits)]
+        several = len(self.accuracy) > 1
+        return [(word if several else "", with_accuracy(self.limits, word)) for word in self.accuracy]
 
 
 def read_plan(path: Path | str, *, data: Path | None = None) -> Plan:
@@ -161,6 +180,7 @@ def _plan(table: Mapping[str, Any], place: Path, text: str, data: Path | None) -
     if starts < 1:
         raise InputError(f"starts is {starts}", remedy="ask for at least one start")
     motion = table.get("motion_seed", 0)
+    limits, accuracy = _limits(table.get("limits", {})), _accuracy(table)
     return Plan(
         title=str(table.get("title", place.stem)),
         data_word=word,
@@ -173,7 +193,9 @@ def _plan(table: Mapping[str, Any], place: Path, text: str, data: Path | None) -
         seed=_whole(table, "seed", 0),
         motion_seed=None if motion is False else _whole(table, "motion_seed", 0),
         metric=metric,
-        limits=_limits(table.get("limits", {})),
+        limits=limits,
+        accuracy=accuracy,
+        run_seconds=_run_seconds(table.get("run_seconds", 3600.0)),
         text=text,
     )
 
@@ -227,7 +249,34 @@ def _limits(table: object) -> Limits:
     for key, value in table.items():
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise InputError(f"[limits] {key} is {value!r}", remedy="give a number")
-    return Limits(**table)
+    limits = Limits(**table)
+    if limits.memory_gb is not None and not can_limit_memory():
+        raise InputError("this system cannot limit memory", remedy="leave [limits] memory_gb out, or run on Linux")
+    return limits
+
+
+def _accuracy(table: Mapping[str, Any]) -> tuple[str, ...]:
+    given = table.get("accuracy", [])
+    words = tuple(_strings([given] if isinstance(given, str) else given, "accuracy"))
+    if len(set(words)) < len(words):
+        raise InputError(f"accuracy is {list(words)}", remedy="name each once")
+    for word in words:
+        with_accuracy(Limits(), word)
+    stated = sorted({"tolerance", "feasibility"} & set(table.get("limits", {})))
+    if words and stated:
+        raise InputError(
+            f"both accuracy = {list(words)} and [limits] {stated[0]} are given",
+            remedy="leave one of them out: an accuracy sets both tolerances",
+        )
+    return words
+
+
+def _run_seconds(given: object) -> float | None:
+    if given is False:
+        return None
+    if isinstance(given, bool) or not isinstance(given, int | float) or not given > 0:
+        raise InputError(f"run_seconds is {given!r}", remedy="give a positive number of seconds, or false for no bound")
+    return float(given)
 
 
 def _only(table: Mapping[str, object], known: Sequence[str], where: str) -> None:

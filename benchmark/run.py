@@ -5,23 +5,27 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import version
+from time import perf_counter
 
 import joblib
 import numpy as np
 
+from nonrigid.benchmark.accuracy import accuracy_of, is_accepted
 from nonrigid.benchmark.choices import backend_words, guarded, parse_backend
 from nonrigid.benchmark.datasets.protocols import PairData
-from nonrigid.benchmark.environment import source_digest
+from nonrigid.benchmark.environment import known_environment, source_digest
 from nonrigid.benchmark.formats import write_corr
 from nonrigid.benchmark.matched_points import matched_points, write_points
 from nonrigid.benchmark.protocol import Score, score
-from nonrigid.benchmark.store import Record, Store
+from nonrigid.benchmark.store import Record, StorageError, Store
 from nonrigid.formulations.formulation import Formulation, Pair, Stages
 from nonrigid.formulations.model import Problem
 from nonrigid.geometry.cache import content_hash
 from nonrigid.geometry.errors import NonrigidError
 from nonrigid.solvers.backend import backend_class
+from nonrigid.solvers.confine import peak_memory
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.match import match
 from nonrigid.solvers.solution import Solution
@@ -32,7 +36,10 @@ TRACE_POINTS = 100
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Run:
-    """Hold one row of a plan: everything that a run depends on but the pair's meshes."""
+    """Hold one row of a plan: everything that a run depends on but the pair's meshes.
+
+    `limits` bound each solve, `run_seconds` the whole run, which is killed then; None for no bound.
+    """
 
     pair: str
     split: str
@@ -47,16 +54,13 @@ class Run:
     metric: str
     limits: Limits
     data_hash: str
+    run_seconds: float | None = None
 
     @property
     def id(self) -> str:
         """Hash of the row, the meshes and the versions; the label does not count."""
-        choice = parse_backend(self.backend)
-        names = sorted({word.partition(":")[0] for word in backend_words(choice)})
-        versions = [f"{name} {sorted(backend_class(name).versions().items())}" for name in names]
         return content_hash(
-            version("nonrigid"),
-            *versions,
+            *_versions(self.backend),
             self.pair,
             repr(self.formulation),
             self.backend,
@@ -65,8 +69,15 @@ class Run:
             self.motion_seed,
             self.metric,
             repr(self.limits),
+            self.run_seconds,
             self.data_hash,
         )[:20]
+
+
+@cache
+def _versions(backend: str) -> tuple[str, ...]:
+    names = sorted({word.partition(":")[0] for word in backend_words(parse_backend(backend))})
+    return version("nonrigid"), *(f"{name} {sorted(backend_class(name).versions().items())}" for name in names)
 
 
 def do_run(run: Run, data: PairData, pair: Pair, store: Store) -> Record:
@@ -77,6 +88,7 @@ def do_run(run: Run, data: PairData, pair: Pair, store: Store) -> Record:
     choice = parse_backend(run.backend)
     observed = Observed(run.formulation)
     record = _head(run)
+    begun = perf_counter()
     try:
         found = match(pair, observed, choice, starts=run.starts, seed=run.seed, limits=guarded(run.limits, choice))
         record |= {
@@ -88,28 +100,39 @@ def do_run(run: Run, data: PairData, pair: Pair, store: Store) -> Record:
             "evaluations": float(sum(solution.evaluations for solution in found.solutions)),
             "stages": [_stage(*both) for both in zip(found.solutions, observed.seen, strict=True)],
         }
+        solved = found.correspondence is not None
+        record["accepted"] = solved and all(is_accepted(solution, run.limits) for solution in found.solutions)
         if found.solutions:
             first: Mapping[str, object] = record["stages"][0]
             names = ("problem", "problem_hash", "sense", "solver", "variables")
             record |= {name: first[name] for name in (*names, "objective", "violation", "stationarity", "bound")}
         if found.correspondence is not None:
             points = found.correspondence.dense(len(data.part.vertices))
-            write_corr(store.match_file(run.id), points)
             errors = None
             if data.truth is not None:
                 result = score(data, points, geodesics=run.metric)
                 errors = result.errors
                 record |= _scored(result)
-            write_points(store.points_file(run.id), matched_points(points, errors, found.solutions))
+            with store.writing():
+                write_corr(store.match_file(run.id), points)
+                write_points(store.points_file(run.id), matched_points(points, errors, found.solutions))
+    except StorageError:
+        raise
     except Exception as failure:
         # A method or library of a third party may raise anything; the row says so, and the benchmark goes on.
         record |= _failed(failure)
+    record |= {"total_seconds": perf_counter() - begun, "peak_memory": peak_memory()}
     return _write(record, store)
 
 
 def write_failure(run: Run, failure: Exception, store: Store) -> Record:
     """Write the record of a run that could not even start."""
     return _write(_head(run) | _failed(failure), store)
+
+
+def write_loss(run: Run, status: str, message: str, store: Store) -> Record:
+    """Write the record of a run whose process was lost: killed at its limit, or ended by a crash."""
+    return _write(_head(run) | {"status": status, "message": message}, store)
 
 
 @dataclass
@@ -168,6 +191,11 @@ def _head(run: Run) -> Record:
         "metric": run.metric,
         "limits": repr(run.limits),
         "source": source_digest(),
+        "accuracy": accuracy_of(run.limits),
+        "accepted": False,
+        "total_seconds": None,
+        "peak_memory": None,
+        "environment": known_environment()[0],
         "stages": [],
     }
 

@@ -1,50 +1,53 @@
-"""Run a plan: pairs in parallel, one process each, every finished run kept at once."""
+"""Run a plan: tasks handed to an executor, every finished run kept at once, lost workers' tasks handed out again."""
 
 from __future__ import annotations
 
 import contextlib
+import os
 import threading
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
-from joblib import Parallel, delayed, parallel_config
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
-from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
-from nonrigid.benchmark.datasets.protocols import PairData, PairSpec
-from nonrigid.benchmark.environment import environment
+from nonrigid.benchmark.datasets.protocols import PairSpec
+from nonrigid.benchmark.environment import known_environment
+from nonrigid.benchmark.executors import Executor, Joblib
 from nonrigid.benchmark.formats import write_text
 from nonrigid.benchmark.plan import Plan
-from nonrigid.benchmark.protocol import random_rigid_motion
-from nonrigid.benchmark.run import Run, do_run, write_failure
+from nonrigid.benchmark.run import Run
 from nonrigid.benchmark.store import Record, Store
+from nonrigid.benchmark.task import Task, WorkerLostError, absolute, data_hash
 from nonrigid.benchmark.terminal import json_text
-from nonrigid.formulations.formulation import Pair
-from nonrigid.geometry.cache import content_hash
-from nonrigid.geometry.errors import NonrigidError
-from nonrigid.geometry.points import SurfacePoints
+from nonrigid.geometry.errors import InputError
+
+ROUNDS = 3
+"""How often tasks are handed out again although workers died and no run was finished since."""
 
 
-@dataclass(frozen=True, eq=False)
-class Task:
-    """Hold the runs of one pair, done one after another in one process, where its derived geometry is shared."""
-
-    spec: PairSpec
-    runs: tuple[Run, ...]
-    folder: Path
-
-
-def run_plan(plan: Plan, out: Path, *, jobs: int = 1, fresh: bool = False, quiet: bool = False) -> list[Record]:
-    """Do every run of a plan that is not finished, and return all of them.
+def run_plan(
+    plan: Plan,
+    out: Path,
+    *,
+    jobs: int = 1,
+    executor: Executor | None = None,
+    share: tuple[int, int] = (1, 1),
+    fresh: bool = False,
+    quiet: bool = False,
+) -> list[Record]:
+    """Do every run of a plan that is not finished, and return all that are.
 
     Parameters
     ----------
     out
         Folder of the results; see `nonrigid.benchmark.store.Store`.
     jobs
-        Processes, each with one BLAS thread.
+        Processes, each with one BLAS thread, where no executor is given.
+    executor
+        Who does the runs; see `nonrigid.benchmark.executors`.
+    share
+        (k, n): do the k-th of n shares of the pairs only, as another machine does the others; see `merge_results`.
     fresh
         Whether to repeat finished runs.
     quiet
@@ -53,41 +56,41 @@ def run_plan(plan: Plan, out: Path, *, jobs: int = 1, fresh: bool = False, quiet
     Raises
     ------
     InputError
-        If a mesh or ground truth of the plan cannot be read. Whatever goes wrong later is a row of the results.
+        If a mesh or ground truth of the plan cannot be read, or another benchmark writes to `out`. Whatever goes wrong
+        later is a row of the results.
+    StorageError
+        If results cannot be written; those that are finished are kept.
+    WorkerLostError
+        If workers died again and again without finishing a run.
     """
+    executor = Joblib(workers=jobs) if executor is None else executor
+    out = Path(os.path.abspath(out))  # noqa: PTH100 - a link is part of the name
     store = Store(out)
     store.prepare()
-    pairs = plan.pairs()
-    runs = {spec.name: plan_runs(plan, spec) for spec in pairs}
-    labels = {run.id: run.label for members in runs.values() for run in members}
-    ids = list(labels)
-    write_text(out / "plan.toml", plan.text)
-    write_text(out / "environment.json", json_text({**environment(), "jobs": jobs}) + "\n")
-    store.write_index({"title": plan.title, "dataset": plan.data_word, "metric": plan.metric, "runs": labels})
-    done = set() if fresh else store.finished(ids)
-    for run in set(ids) - done:
-        (store.runs / f"{run}.json").unlink(missing_ok=True)
-    tasks = []
-    for spec in pairs:
-        todo = tuple(run for run in runs[spec.name] if run.id not in done)
-        for part in _shares(todo, -(-jobs // len(pairs))):
-            tasks.append(Task(spec, part, out))
-    with _progress(store, ids, quiet), parallel_config(backend="loky", n_jobs=jobs, inner_max_num_threads=1):
-        Parallel(batch_size=1)(delayed(do_task)(task) for task in tasks)
-    records = store.records()
-    store.write_table(records)
+    with _alone(out):
+        pairs = [absolute(spec) for spec in plan.pairs()]
+        runs = {spec.name: plan_runs(plan, spec) for spec in pairs}
+        _write_head(plan, store, runs, executor.workers)
+        mine = pairs[share[0] - 1 :: share[1]]
+        ids = [run.id for spec in mine for run in runs[spec.name]]
+        if fresh:
+            store.drop(ids)
+        with _progress(store, ids, quiet):
+            _hand_out(executor, store, mine, runs, ids)
+        records = store.records()
+        store.write_table(records)
     return records
 
 
 def plan_runs(plan: Plan, spec: PairSpec) -> list[Run]:
-    """Return the runs of one pair: every method with every backend."""
+    """Return the runs of one pair: every method with every backend and every accuracy."""
     data = data_hash(spec.load())
     return [
         Run(
             pair=spec.name,
             split=spec.split,
             class_name=spec.class_name,
-            label=entry.label,
+            label=f"{entry.label} ({accuracy})" if accuracy else entry.label,
             method=entry.method,
             formulation=entry.formulation,
             backend=backend,
@@ -95,43 +98,45 @@ def plan_runs(plan: Plan, spec: PairSpec) -> list[Run]:
             seed=plan.seed,
             motion_seed=plan.motion_seed,
             metric=plan.metric,
-            limits=plan.limits,
+            limits=limits,
             data_hash=data,
+            run_seconds=plan.run_seconds,
         )
         for entry in plan.methods
+        for accuracy, limits in plan.variants()
         for backend in plan.backends
     ]
 
 
-def data_hash(data: PairData) -> str:
-    """Return a hash of a pair's meshes and ground truth."""
-    arrays = [data.part.vertices, data.part.faces, data.full.vertices, data.full.faces]
-    for points in (data.truth, data.mirrored):
-        if isinstance(points, SurfacePoints):
-            arrays += [points.faces, points.barycentric]
-    return content_hash(*arrays)
+def _write_head(plan: Plan, store: Store, runs: Mapping[str, Sequence[Run]], workers: int) -> None:
+    labels = {run.id: run.label for members in runs.values() for run in members}
+    word, found = known_environment()
+    store.write_environment(word, found)
+    with store.writing():
+        write_text(store.folder / "plan.toml", plan.text)
+        write_text(store.folder / "environment.json", json_text({**found, "jobs": workers}) + "\n")
+    store.write_index({"title": plan.title, "dataset": plan.data_word, "metric": plan.metric, "runs": labels})
 
 
-def do_task(task: Task) -> None:
-    """Do the runs of one pair, after deriving the geometry that they share, so that times are the solvers' own."""
-    store = Store(task.folder)
-    data = task.spec.load()
-    part = data.part
-    if (seed := task.runs[0].motion_seed) is not None:
-        part = random_rigid_motion(part, seed)[0]
-    with threadpool_limits(1):
+def _hand_out(
+    executor: Executor, store: Store, pairs: Sequence[PairSpec], runs: Mapping[str, Sequence[Run]], ids: Sequence[str]
+) -> None:
+    barren = 0
+    while len(done := store.finished(ids)) < len(ids):
+        tasks = []
+        for spec in pairs:
+            todo = [run for run in runs[spec.name] if run.id not in done]
+            for part in _shares(todo, -(-executor.workers // len(pairs))):
+                tasks.append(Task(spec, part, store.folder))
         try:
-            pair = Pair.of(part, data.full)
-        except NonrigidError as refusal:
-            for run in task.runs:
-                write_failure(run, refusal, store)
-            return
-        for formulation in {repr(run.formulation): run.formulation for run in task.runs}.values():
-            # What this raises, the runs raise again, each into its own row.
-            with contextlib.suppress(Exception):
-                next(iter(formulation.stages(pair)))
-        for run in task.runs:
-            do_run(run, data, pair, store)
+            executor.do(tasks)
+        except WorkerLostError as lost:
+            barren = 0 if len(store.finished(ids)) > len(done) else barren + 1
+            if barren == ROUNDS:
+                raise WorkerLostError(
+                    f"{lost}; {ROUNDS} times in a row, no run was finished in between: give fewer --jobs, or limit "
+                    f"memory by [limits] memory_gb"
+                ) from None
 
 
 def _shares(runs: Sequence[Run], count: int) -> list[tuple[Run, ...]]:
@@ -140,20 +145,39 @@ def _shares(runs: Sequence[Run], count: int) -> list[tuple[Run, ...]]:
 
 
 @contextlib.contextmanager
+def _alone(out: Path) -> Iterator[None]:
+    """Hold the folder's lock, which the system takes back when this process dies, and clear away half-written files."""
+    with (out / ".lock").open("w") as file:
+        if os.name == "posix":
+            import fcntl
+
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise InputError(
+                    "another benchmark writes there", file=out, remedy="wait for it, or name another --out"
+                ) from None
+        for folder in (out, out / "runs", out / "matches"):
+            for path in (*folder.glob(".*.*.*"), *folder.glob("*.part")):
+                path.unlink(missing_ok=True)
+        yield
+
+
+@contextlib.contextmanager
 def _progress(store: Store, ids: Sequence[str], quiet: bool) -> Iterator[None]:
-    """Show how many runs are finished, by looking for their files."""
+    """Show how many runs are finished and when the rest will be, by looking for their files."""
     console = Console(stderr=True)
     if quiet or not console.is_terminal:
         yield
         return
     columns = (TextColumn("runs"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), TimeRemainingColumn())
     stop = threading.Event()
-    with Progress(*columns, console=console) as bar:
+    with Progress(*columns, console=console, auto_refresh=False, speed_estimate_period=3600.0) as bar:
         shown = bar.add_task("runs", total=len(ids), completed=len(store.finished(ids)))
 
         def look() -> None:
             while not stop.wait(0.5):
-                bar.update(shown, completed=len(store.finished(ids)))
+                bar.update(shown, completed=len(store.finished(ids)), refresh=True)
 
         watcher = threading.Thread(target=look, daemon=True)
         watcher.start()
@@ -162,4 +186,4 @@ def _progress(store: Store, ids: Sequence[str], quiet: bool) -> Iterator[None]:
         finally:
             stop.set()
             watcher.join()
-            bar.update(shown, completed=len(store.finished(ids)))
+            bar.update(shown, completed=len(store.finished(ids)), refresh=True)

@@ -2,39 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
-import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
 from nonrigid.benchmark.formats import write_text
+from nonrigid.benchmark.tables import SCHEMA_VERSION, check_schema, migrated, write_tables
 from nonrigid.benchmark.terminal import json_text
-from nonrigid.geometry.errors import InputError
+from nonrigid.geometry.errors import InputError, NonrigidError
 
-SCHEMA_VERSION = 1
 Record = dict[str, Any]
 
-_TEXT, _REAL, _WHOLE = pa.string(), pa.float64(), pa.int64()
-COLUMNS: Mapping[str, pa.DataType] = {
-    **dict.fromkeys(("id", "pair", "split", "class_name", "label", "method", "settings", "backend"), _TEXT),
-    **dict.fromkeys(("starts", "seed", "motion_seed"), _WHOLE),
-    **dict.fromkeys(("metric", "status", "message", "solver", "problem", "problem_hash", "sense"), _TEXT),
-    "variables": _WHOLE,
-    **dict.fromkeys(("objective", "gap", "violation", "stationarity", "bound"), _REAL),
-    **dict.fromkeys(("build_seconds", "solve_seconds", "formulation_seconds", "evaluations"), _REAL),
-    **dict.fromkeys(("mean_error", "mean_error_per_point", "coverage", "kept_area"), _REAL),
-    "side": _TEXT,
-    **dict.fromkeys(("match_count", "unmatched_count"), _WHOLE),
-    "curve": pa.list_(pa.float64()),
-    **dict.fromkeys(("stages", "source", "finished"), _TEXT),
-}
-"""Columns of runs.parquet. Errors are fractions of sqrt(full area); objective and gap are the first problem's."""
+
+class StorageError(NonrigidError, OSError):
+    """Report that results cannot be written: the disk or a quota is full, or the folder is not writable."""
 
 
 class Store:
@@ -43,18 +28,21 @@ class Store:
     Parameters
     ----------
     folder
-        Holds `plan.toml`, `environment.json`, `index.json` (what the plan asks for), `runs/<id>.json`,
-        `matches/<id>.corr`, `matches/<id>.npz` and, once complete, `runs.parquet`.
+        Holds `plan.toml`, `environment.json`, `index.json` (what the plan asks for); for each run `runs/<id>.json`,
+        `matches/<id>.corr`, `matches/<id>.npz` and `logs/<id>.log`; `environments/<word>.json` for each machine; and,
+        once complete, `runs.parquet`, `traces.parquet` and `environment.parquet`.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         self.runs = folder / "runs"
         self.matches = folder / "matches"
+        self.logs = folder / "logs"
+        self.environments = folder / "environments"
 
     def prepare(self) -> None:
         """Make the folders; raise `InputError` where a file stands in the way."""
-        for place in (self.runs, self.matches):
+        for place in (self.runs, self.matches, self.logs, self.environments):
             try:
                 place.mkdir(parents=True, exist_ok=True)
             except OSError as error:
@@ -70,21 +58,63 @@ class Store:
         """Return where a run's matches are kept with their errors; see `nonrigid.benchmark.matched_points`."""
         return self.matches / f"{run}.npz"
 
+    def log_file(self, run: str) -> Path:
+        """Return where everything is kept that a run and the libraries in it printed."""
+        return self.logs / f"{run}.log"
+
+    def files(self, run: str) -> list[Path]:
+        """Return where everything of a run is kept, its record first; not all need exist."""
+        return [self.runs / f"{run}.json", self.match_file(run), self.points_file(run), self.log_file(run)]
+
     def has(self, run: str) -> bool:
         """Tell whether a run is finished."""
         return (self.runs / f"{run}.json").is_file()
 
     def finished(self, wanted: Iterable[str]) -> set[str]:
         """Return which of these runs are finished."""
-        return {run for run in wanted if self.has(run)}
+        return set(wanted) & {path.name.removesuffix(".json") for path in _listed(self.runs)}
+
+    def drop(self, runs: Iterable[str]) -> None:
+        """Remove what there is of these runs, so that they are to be done."""
+        for run in runs:
+            for path in self.files(run):
+                path.unlink(missing_ok=True)
+
+    @contextlib.contextmanager
+    def writing(self) -> Iterator[None]:
+        """Turn what a full disk or a lost folder raises into a `StorageError` that says what to do."""
+        try:
+            yield
+        except OSError as error:
+            raise StorageError(
+                f"{self.folder}: results cannot be written ({error.strerror or error}); make room and repeat the "
+                f"command: the {len(_listed(self.runs))} finished runs are kept"
+            ) from None
 
     def write_run(self, record: Record) -> None:
-        """Write one run."""
-        write_text(self.runs / f"{record['id']}.json", json_text({"schema": SCHEMA_VERSION, **record}) + "\n")
+        """Write one run; raise `StorageError` where that fails."""
+        with self.writing():
+            write_text(self.runs / f"{record['id']}.json", json_text({"schema": SCHEMA_VERSION, **record}) + "\n")
+
+    def read_run(self, run: str) -> Record:
+        """Return one finished run, as this version would have written it; `InputError` names a file that is broken."""
+        path = self.runs / f"{run}.json"
+        try:
+            return migrated(_read(path))
+        except InputError as error:
+            raise error.at(path) from None
+
+    def write_environment(self, word: str, environment: Mapping[str, Any]) -> None:
+        """Write what a machine is, under the word that its runs name it by."""
+        path = self.environments / f"{word}.json"
+        if not path.is_file():
+            with self.writing():
+                write_text(path, json_text(environment) + "\n")
 
     def write_index(self, index: Record) -> None:
         """Write what the plan asks for."""
-        write_text(self.folder / "index.json", json_text({"schema": SCHEMA_VERSION, **index}) + "\n")
+        with self.writing():
+            write_text(self.folder / "index.json", json_text({"schema": SCHEMA_VERSION, **index}) + "\n")
 
     def index(self) -> Record:
         """Return what the plan asks for; raise `InputError` where there are no results."""
@@ -94,39 +124,23 @@ class Store:
                 "holds no results", file=self.folder, remedy="run `nonrigid bench PLAN --out` with it first"
             )
         found = _read(path)
-        if found.get("schema") != SCHEMA_VERSION:
-            raise InputError(
-                f"schema {found.get('schema')}, but this version reads {SCHEMA_VERSION}",
-                file=path,
-                remedy="use the version of nonrigid that wrote it",
-            )
+        try:
+            check_schema(found.get("schema"))
+        except InputError as error:
+            raise error.at(path) from None
         return found
 
     def records(self) -> list[Record]:
         """Return the finished runs of the plan, in its order, with the gap of each to the best known objective."""
         labels: dict[str, str] = self.index()["runs"]
-        found = [{**_read(self.runs / f"{run}.json"), "label": label} for run, label in labels.items() if self.has(run)]
-        return with_gaps(found)
+        done = self.finished(labels)
+        return with_gaps([{**self.read_run(run), "label": label} for run, label in labels.items() if run in done])
 
     def write_table(self, records: list[Record]) -> Path:
-        """Write runs.parquet, whole or not at all, and return its path."""
-        rows = [{**record, "stages": json.dumps(record.get("stages", []))} for record in records]
-        columns = {
-            name: pa.array([row.get(name) for row in rows], type=kind, from_pandas=True)
-            for name, kind in COLUMNS.items()
-        }
-        table = pa.table(columns).replace_schema_metadata({"nonrigid_schema": str(SCHEMA_VERSION)})
-        path = self.folder / "runs.parquet"
-        handle, temporary = tempfile.mkstemp(dir=self.folder, suffix=".part")
-        os.close(handle)
-        try:
-            pq.write_table(table, temporary)
-            Path(temporary).chmod(0o644)
-            Path(temporary).replace(path)
-        except BaseException:
-            Path(temporary).unlink(missing_ok=True)
-            raise
-        return path
+        """Write the parquet tables, each whole or not at all, and return the path of runs.parquet."""
+        environments = {path.stem: _read(path) for path in _listed(self.environments)}
+        with self.writing():
+            return write_tables(self.folder, records, environments)
 
 
 def with_gaps(records: list[Record]) -> list[Record]:
@@ -167,6 +181,13 @@ def _gap(stage: Record, best: Mapping[str, float]) -> float | None:
 def _comparable(stage: Record) -> bool:
     objective = stage.get("objective")
     return bool(stage["problem_hash"] and stage["usable"] and objective is not None and math.isfinite(objective))
+
+
+def _listed(folder: Path) -> list[Path]:
+    if not folder.is_dir():
+        return []
+    with os.scandir(folder) as found:
+        return [Path(item.path) for item in found if item.name.endswith(".json") and not item.name.startswith(".")]
 
 
 def _read(path: Path) -> Record:

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-import multiprocessing
+import os
 import time
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
-from typing import Any
 
 from nonrigid.formulations.model import Problem
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.backend import Backend
+from nonrigid.solvers.confine import (
+    child_context,
+    die_with_parent,
+    flush_native_output,
+    is_out_of_memory,
+    limit_memory,
+)
 from nonrigid.solvers.judge import Values, judge
 from nonrigid.solvers.layout import Layout
 from nonrigid.solvers.limits import Limits
@@ -24,37 +30,33 @@ _REPORT_EVERY = 0.1  # seconds between the points that the child hands over whil
 def run_isolated(problem: Problem, backend: Backend, start: Values, limits: Limits) -> Solution:
     """Solve in a child process, kill it at `limits.hard_seconds`, and keep the best point it had handed over.
 
-    A crash of a native library ends as `backend_error` with the signal's number.
+    A crash of a native library ends as `backend_error` with the signal's number, a solve that fills its
+    `limits.memory_gb` as `limit`, or as `backend_error` where it had no point yet.
     """
-    assert limits.hard_seconds is not None
-    context: Any = multiprocessing.get_context(_start_method())
+    context = child_context()
     here, there = context.Pipe(duplex=False)
-    child = context.Process(target=_work, args=(there, problem, backend, start, limits), daemon=True)
+    child = context.Process(target=_work, args=(there, os.getpid(), problem, backend, start, limits), daemon=True)
     begun = time.perf_counter()
     child.start()
     there.close()
-    heard = _listen(here, begun + limits.hard_seconds)
+    heard = _listen(here, None if limits.hard_seconds is None else begun + limits.hard_seconds)
     seconds = time.perf_counter() - begun
     if heard.expired:
         child.kill()
     child.join()
     here.close()
     if heard.answer is not None:
-        return heard.answer
+        return _told_of_memory(heard.answer, limits)
     if heard.expired:
         status, words = Status.LIMIT, f"killed after {limits.hard_seconds:g} s"
     else:
         status = Status.BACKEND_ERROR
         words = heard.words or f"the child process ended with exit code {child.exitcode}"
-    return _salvaged(problem, backend, status, words, heard, seconds)
+    return _told_of_memory(_salvaged(problem, backend, status, words, heard, seconds), limits)
 
 
-def _start_method() -> str:
-    # Forking hands the problem's matrices over without copying them; platforms that cannot fork pickle them.
-    return "fork" if "fork" in multiprocessing.get_all_start_methods() else "spawn"
-
-
-def _work(pipe: Connection, problem: Problem, backend: Backend, start: Values, limits: Limits) -> None:
+def _work(pipe: Connection, parent: int, problem: Problem, backend: Backend, start: Values, limits: Limits) -> None:
+    die_with_parent(parent)
     sent = [0.0]
 
     def report(point: FloatArray, trace: TracePoint) -> None:
@@ -64,10 +66,20 @@ def _work(pipe: Connection, problem: Problem, backend: Backend, start: Values, l
             pipe.send((point, trace))
 
     try:
+        if limits.memory_gb is not None:
+            limit_memory(limits.memory_gb)
         pipe.send(solve_once(problem, backend, start, limits, report))
     except Exception as failure:  # nothing that a third party's `accepts` or bridge raises may look like a crash
         pipe.send(f"{type(failure).__name__}: {failure}")
     pipe.close()
+    flush_native_output()
+
+
+def _told_of_memory(answer: Solution, limits: Limits) -> Solution:
+    if limits.memory_gb is None or answer.status is not Status.BACKEND_ERROR or not is_out_of_memory(answer.raw_status):
+        return answer
+    status = Status.LIMIT if answer.values else Status.BACKEND_ERROR
+    return replace(answer, status=status, message=f"{limits.memory_gb:g} GB of memory are spent; {status.advice}")
 
 
 @dataclass
@@ -81,10 +93,14 @@ class _Heard:
     expired: bool = False
 
 
-def _listen(pipe: Connection, deadline: float) -> _Heard:
+def _listen(pipe: Connection, deadline: float | None) -> _Heard:
     # A dead child shows as a closed pipe, possibly in mid-message; it may not yet show as a dead process.
     heard = _Heard()
-    while (left := deadline - time.perf_counter()) > 0 and pipe.poll(left):
+    while True:
+        left = None if deadline is None else deadline - time.perf_counter()
+        if (left is not None and left <= 0.0) or not pipe.poll(left):
+            heard.expired = True
+            return heard
         try:
             message = pipe.recv()
         except (EOFError, OSError):
@@ -97,8 +113,6 @@ def _listen(pipe: Connection, deadline: float) -> _Heard:
             return heard
         heard.best, point = message
         heard.trace.append(point)
-    heard.expired = True
-    return heard
 
 
 def _salvaged(

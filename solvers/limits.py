@@ -22,6 +22,9 @@ class Limits:
     hard_seconds
         Wall-clock time after which the solve is killed: it then runs in a child process, and the best point that had
         been reported is kept. None (default) runs in this process.
+    memory_gb
+        Memory, in gigabytes of 10^9 bytes, that a solve may take beyond what its process holds when it begins: it then
+        runs in a child process (Linux only). None (default) for no bound.
     tolerance
         Stationarity, relative to max(1, |objective|), at which a point counts as stationary; backends are asked to go
         a little beyond it.
@@ -37,11 +40,12 @@ class Limits:
     evaluations: int | None = None
     seconds: float | None = 60.0
     hard_seconds: float | None = None
+    memory_gb: float | None = None
     tolerance: float = 1e-6
     feasibility: float = 1e-7
 
     def __post_init__(self) -> None:
-        for name in ("evaluations", "seconds", "hard_seconds"):
+        for name in ("evaluations", "seconds", "hard_seconds", "memory_gb"):
             value = getattr(self, name)
             if value is not None and not value > 0:
                 raise InputError(f"{name} is {value}", remedy="give a positive number, or None for no limit")

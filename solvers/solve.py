@@ -81,7 +81,7 @@ def solve(
 
 
 def _attempt(problem: Problem, backend: Backend, start: Values, limits: Limits) -> Solution:
-    if limits.hard_seconds is None:
+    if limits.hard_seconds is None and limits.memory_gb is None:
         return solve_once(problem, backend, start, limits)
     return run_isolated(problem, backend, start, limits)
 

@@ -22,7 +22,8 @@ from nonrigid.benchmark.report.table import refusals, summary
 from nonrigid.benchmark.report.write import write_report
 from nonrigid.benchmark.run import do_run, problem_hash
 from nonrigid.benchmark.runner import plan_runs, run_plan
-from nonrigid.benchmark.store import COLUMNS, SCHEMA_VERSION, Store, with_gaps
+from nonrigid.benchmark.store import Store, with_gaps
+from nonrigid.benchmark.tables import COLUMNS, SCHEMA_VERSION
 from nonrigid.formulations.formulation import Pair, Stages
 from nonrigid.formulations.model import Problem, QuadraticForm, Simplex, Variable, maximize
 from nonrigid.geometry.errors import InputError
@@ -202,6 +203,6 @@ def test_a_mesh_that_cannot_be_matched_is_a_row(plan: Plan, tmp_path: Path, monk
     def refuse(part: Mesh, full: Mesh) -> Pair:
         raise InputError("two pieces", remedy="keep one")
 
-    monkeypatch.setattr("nonrigid.benchmark.runner.Pair.of", refuse)
+    monkeypatch.setattr("nonrigid.benchmark.task.Pair.of", refuse)
     records = run_plan(plan, tmp_path, quiet=True)
     assert {(record["status"], record["message"]) for record in records} == {("error", "two pieces; keep one")}
