@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -47,7 +48,41 @@ class Summary:
     curve: FloatArray
 
 
-def summarize(scores: Sequence[Score], *, label: str = "all shapes") -> Summary:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ScoredRow:
+    """Hold the scores of one finished run; see `nonrigid.benchmark.protocol.Score`."""
+
+    metric: str
+    mean_error: float
+    mean_error_per_point: float
+    match_count: int
+    coverage: float
+    curve: FloatArray
+    kept_area: float
+
+
+Scored: TypeAlias = Score | ScoredRow
+
+
+def scored_rows(records: Sequence[Mapping[str, Any]]) -> list[ScoredRow]:
+    """Return the scores of those runs that have some; runs without a correspondence have none."""
+    nothing = float("nan")
+    return [
+        ScoredRow(
+            metric=record["metric"],
+            mean_error=nothing if record["mean_error"] is None else record["mean_error"],
+            mean_error_per_point=nothing if record["mean_error"] is None else record["mean_error_per_point"],
+            match_count=record["match_count"],
+            coverage=record["coverage"],
+            curve=np.array(record["curve"], dtype=np.float64),
+            kept_area=record["kept_area"],
+        )
+        for record in records
+        if record.get("match_count") is not None
+    ]
+
+
+def summarize(scores: Sequence[Scored], *, label: str = "all shapes") -> Summary:
     """Average the scores of several shapes.
 
     Raises
@@ -75,7 +110,7 @@ def summarize(scores: Sequence[Score], *, label: str = "all shapes") -> Summary:
     )
 
 
-def by_partiality(scores: Sequence[Score], *, cumulative: bool) -> list[Summary]:
+def by_partiality(scores: Sequence[Scored], *, cumulative: bool) -> list[Summary]:
     """Average by missing area in steps of 10 %.
 
     Cumulative bins hold the shapes whose missing area is at most 10, 20, ... 100 %, as the track's page defines;
@@ -95,7 +130,7 @@ def by_partiality(scores: Sequence[Score], *, cumulative: bool) -> list[Summary]
     return summaries
 
 
-def _missing(score: Score) -> float:
+def _missing(score: Scored) -> float:
     return float(np.clip(1.0 - score.kept_area, 0.0, 1.0))
 
 

@@ -1,7 +1,8 @@
-"""`nonrigid report`: tables, figures and a page made from results."""
+"""`nonrigid report`: tables, figures and pages made from results."""
 
 from __future__ import annotations
 
+import webbrowser
 from pathlib import Path
 from typing import Annotated
 
@@ -9,24 +10,43 @@ import typer
 
 from nonrigid.benchmark.commands.summary import show_summary
 from nonrigid.benchmark.report.table import notes, summary
-from nonrigid.benchmark.report.write import write_report
+from nonrigid.benchmark.report.write import draw_figures, write_report
 from nonrigid.benchmark.store import Store
 from nonrigid.benchmark.terminal import say, show_json
+from nonrigid.geometry.errors import InputError
 
 
 def report_command(
     folder: Annotated[Path, typer.Argument(help="Results of `nonrigid bench`.", show_default=False)],
+    open_page: Annotated[bool, typer.Option("--open", help="Open the report in the browser.")] = False,
+    figure: Annotated[
+        str | None, typer.Option(help="Draw this figure only, such as curves, into DIR/report.", show_default=False)
+    ] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of the data set's files; else $NONRIGID_DATA, else ../shared/data.")
+    ] = None,
+    jobs: Annotated[int, typer.Option(help="Processes.")] = 1,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Print solver against accuracy, and write DIR/report: index.html, CSV, Markdown, PNG and SVG."""
+    """Print solver against accuracy, and write DIR/report: an overview, a page a pair, figures and tables."""
+    if jobs < 1:
+        raise InputError(f"--jobs is {jobs}", remedy="give at least 1")
     store = Store(folder)
     index, records = store.index(), store.records()
-    page = write_report(folder, index, records)
+    if figure is not None:
+        out = folder / "report"
+        out.mkdir(exist_ok=True)
+        draw_figures(out, records, only=figure)
+        say(f"Figure: {(out / figure).resolve()}.pdf, .png, .csv, .tex, -light.svg, -dark.svg")
+        return
+    page = write_report(folder, index, records, data=data, jobs=jobs)
     rows = summary(records)
     if json:
         show_json({"title": index["title"], "page": str(page), "rows": rows, "notes": notes(index, records)})
-        return
-    show_summary(index["title"], rows)
-    for note in notes(index, records):
-        say(note)
-    say(f"Report: {page.resolve()}")
+    else:
+        show_summary(index["title"], rows)
+        for note in notes(index, records):
+            say(note)
+        say(f"Report: {page.resolve()}")
+    if open_page and not webbrowser.open(page.resolve().as_uri()):
+        raise InputError("there is no browser to open", file=page, remedy="open the file by hand")

@@ -1,0 +1,1 @@
+"""What the pages of a report are made of: templates, style and scripts; they ask nobody for anything."""
