@@ -84,8 +84,22 @@ def consistency(
         raise InputError(
             f"kernel_width is {kernel_width}", remedy="give a length in units of sqrt(full area), e.g. 0.03"
         )
-    payoff = distortion(pair, matches, sides=sides, excess_weight=excess_weight, keep=keep)
-    np.square(payoff, out=payoff)
+    return payoff_of(
+        distortion(pair, matches, sides=sides, excess_weight=excess_weight, keep=keep), matches, kernel_width
+    )
+
+
+def payoff_of(disagreement: FloatArray, matches: Candidates, kernel_width: float) -> FloatArray:
+    """Return the (n, n) payoff of disagreements between n matches, written over them; see `consistency`.
+
+    Examples
+    --------
+    >>> two = Candidates(np.array([0, 1]), np.array([5, 6]), np.zeros(2))
+    >>> payoff_of(np.array([[0.0, 0.03], [0.03, 0.0]]), two, 0.03).round(3)
+    array([[0. , 0.5],
+           [0.5, 0. ]])
+    """
+    payoff = np.square(disagreement, out=disagreement)
     payoff *= -np.log(2.0) / kernel_width**2
     np.exp(payoff, out=payoff)
     payoff[matches.conflicts()] = 0.0

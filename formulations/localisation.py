@@ -20,8 +20,7 @@ def multilateration_cost(
 ) -> FloatArray:
     """Return, for vertices of the part and all vertices of the full surface, how badly they fit as a match.
 
-    cost(x, y) = sum_a w_a(x) (d(x, a) - D(y, a'))^2 / sum_a w_a(x) + descriptor_weight |s(x) - S(y)|^2 with weights
-    w_a(x) = exp(-(d(x, a) / reach)^2): near anchors count most, because long distances are those a cut disturbs.
+    cost(x, y) = `placing_cost` + descriptor_weight |s(x) - S(y)|^2.
 
     Parameters
     ----------
@@ -38,14 +37,34 @@ def multilateration_cost(
     -------
     (p, n_full), in units of the full area.
     """
-    on_part = pair.part.distances(anchors.part)[:, points]
-    on_full = pair.full.distances(anchors.full)
-    weight = np.exp(-np.square((on_part - on_part.min(axis=0)) / reach))
-    weight /= weight.sum(axis=0)
-    cost = (weight * on_part**2).sum(axis=0)[:, None] - 2.0 * (weight * on_part).T @ on_full + weight.T @ on_full**2
+    cost = placing_cost(pair.part.distances(anchors.part)[:, points], pair.full.distances(anchors.full), reach=reach)
     rows, columns = describe(pair.part, radii)[points], describe(pair.full, radii)
     cost += descriptor_weight * (2.0 - 2.0 * rows @ columns.T)
     return np.asarray(cost)
+
+
+def placing_cost(on_part: FloatArray, on_full: FloatArray, *, reach: float) -> FloatArray:
+    """Return (p, n) how badly distances to anchors place each of p points at each of n others.
+
+    cost(x, y) = sum_a w_a(x) (d(x, a) - D(y, a'))^2 / sum_a w_a(x) with w_a(x) = exp(-((d(x, a) - m) / reach)^2) and m
+    the distance of x to its nearest anchor: near anchors count most, because long distances are those a cut disturbs.
+
+    Parameters
+    ----------
+    on_part, on_full
+        (a, p) and (a, n) distances to the anchors and to their images.
+    reach
+        Distance at which an anchor counts 1/e, in units of sqrt(full area).
+
+    Examples
+    --------
+    >>> placing_cost(np.array([[0.0], [1.0]]), np.array([[0.0, 1.0], [1.0, 0.0]]), reach=1.0).round(6)
+    array([[0., 1.]])
+    """
+    weight = np.exp(-np.square((on_part - on_part.min(axis=0)) / reach))
+    weight /= weight.sum(axis=0)
+    own = (weight * on_part**2).sum(axis=0)[:, None]
+    return np.asarray(own - 2.0 * (weight * on_part).T @ on_full + weight.T @ on_full**2)
 
 
 def local_matches(

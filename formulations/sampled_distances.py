@@ -8,7 +8,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nonrigid.formulations.candidates import Candidates
+from nonrigid.formulations.distortion import payoff_of
 from nonrigid.formulations.formulation import Pair
+from nonrigid.formulations.localisation import placing_cost
 from nonrigid.formulations.trusted_descriptors import TrustedDescriptors
 from nonrigid.geometry.arrays import FloatArray, IntArray
 
@@ -55,16 +57,12 @@ class SampledDistances:
         """Return the (n, n) two-sided payoff; see `nonrigid.formulations.distortion.consistency`."""
         excess = self.on_part[np.ix_(matches.part, matches.part)]
         excess -= self.on_full[np.ix_(matches.full, matches.full)]
-        payoff = np.exp(np.square(excess, out=excess) * (-np.log(2.0) / kernel_width**2))
-        payoff[matches.conflicts()] = 0.0
-        return np.asarray(0.5 * (payoff + payoff.T))
+        return payoff_of(excess, matches, kernel_width)
 
     def placed(self, rows: IntArray, images: IntArray, *, reach: float, descriptor_weight: float) -> IntArray:
         """Return, for every sample of the part, the point of the grid where its distances to anchors place it.
 
-        It is the y with the least sum_a w_a(x) (d(x, a) - D(y, a'))^2 / sum_a w_a(x) + descriptor_weight * unlike(x, y)
-        with w_a(x) = exp(-((d(x, a) - min_b d(x, b)) / reach)^2): near anchors count most, because long distances are
-        those a cut disturbs.
+        It is the y with the least `placing_cost` + descriptor_weight * unlike(x, y).
 
         Parameters
         ----------
@@ -75,10 +73,7 @@ class SampledDistances:
         -------
         (p,) rows of the grid.
         """
-        on_part, on_full = self.on_part[rows], self.on_full[images]
-        weight = np.exp(-np.square((on_part - on_part.min(axis=0)) / reach))
-        weight /= weight.sum(axis=0)
-        cost = weight.T @ on_full**2 - 2.0 * (weight * on_part).T @ on_full + descriptor_weight * self.unlike
+        cost = placing_cost(self.on_part[rows], self.on_full[images], reach=reach) + descriptor_weight * self.unlike
         return np.asarray(cost.argmin(axis=1), dtype=np.int64)
 
     def disagreement(self, images: IntArray) -> FloatArray:
