@@ -1,4 +1,4 @@
-"""The command line: `nonrigid match`, `score`, `solvers`, `bench`, `report`, `cite` and `cache`."""
+"""The command line: `nonrigid match`, `score`, `data`, `solvers`, `bench`, `report`, `cite` and others."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 from nonrigid.benchmark.commands.bench import bench_command
 from nonrigid.benchmark.commands.cache import cache_command
 from nonrigid.benchmark.commands.cite import cite_command
+from nonrigid.benchmark.commands.data import data_app
 from nonrigid.benchmark.commands.match import match_command
 from nonrigid.benchmark.commands.merge import merge_command
 from nonrigid.benchmark.commands.report import report_command
@@ -71,6 +72,7 @@ app.command("bench")(bench_command)
 app.command("merge")(merge_command)
 app.command("report")(report_command)
 app.command("cite")(cite_command)
+app.add_typer(data_app, name="data")
 app.command("cache")(cache_command)
 
 

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from nonrigid.benchmark.datasets.files import FileSource, list_tree, load_mesh, local_file
+from nonrigid.benchmark.datasets.files import FileSource, bare_name, list_tree, load_mesh, local_file
+from nonrigid.benchmark.datasets.folds import Fold, select_fold
 from nonrigid.benchmark.datasets.layouts import survey, template_folder
 from nonrigid.benchmark.datasets.problems import Problem, Survey
 from nonrigid.benchmark.datasets.protocols import PairSpec, PointsSource
@@ -37,6 +38,9 @@ class Archive:
         Keep these, such as ("cuts",); all where empty.
     names
         Keep these pairs only; all of them where None.
+    fold
+        Such as "2/5": keep the pairs of this fold by source pose; "not 2/5" keeps those to learn from. All where empty.
+        See `nonrigid.benchmark.datasets.folds`.
 
     Raises
     ------
@@ -50,11 +54,13 @@ class Archive:
     templates: Path | None = None
     splits: tuple[str, ...] = ()
     names: tuple[str, ...] | None = None
+    fold: str = ""
 
     @property
     def name(self) -> str:
-        """Name of the folder or archive, and of the chosen splits."""
-        return " ".join([list_name(Path(self.root)), *self.splits])
+        """Name of the folder or archive, of the chosen splits and of the fold."""
+        fold = [f"fold {Fold.parse(self.fold)} by source pose"] if self.fold else []
+        return " ".join([bare_name(Path(self.root)), *self.splits, *fold])
 
     def pairs(self) -> Sequence[PairSpec]:
         """List the pairs by set, split, class and number."""
@@ -75,9 +81,13 @@ class Archive:
         for fault in found.faults:
             if fault.pair is None or fault.pair in wanted:
                 raise fault.error()
-        poses = {archive: _source_poses(source) for archive, source in found.poses.items()}
-        order = self.names or tuple(chosen)
-        return [_spec(name, chosen[name], poses.get(chosen[name].archive, {})) for name in order]
+        specs = _specs(found, {name: chosen[name] for name in self.names or chosen})
+        return select_fold(specs, Fold.parse(self.fold)) if self.fold else specs
+
+    def complete_pairs(self, found: Survey) -> Sequence[PairSpec]:
+        """List the pairs of a survey that lack no file, whatever else is wrong with the set."""
+        faulty = {fault.pair for fault in found.faults}
+        return _specs(found, {name: problem for name, problem in _named(found).items() if problem.name not in faulty})
 
     def survey(self) -> Survey:
         """Find what there is, with every fault; raise `InputError` only if nothing is recognised."""
@@ -114,11 +124,6 @@ def open_dataset(root: Path | str, *, templates: Path | str | None = None) -> Ar
     nonrigid.geometry.errors.InputError: nowhere: there is no such folder or archive; check the path
     """
     return Archive(root=Path(root), templates=None if templates is None else Path(templates))
-
-
-def list_name(root: Path) -> str:
-    """Return the name of a folder or archive, without the suffix of an archive."""
-    return root.resolve().stem if root.suffix.lower() == ".zip" else root.resolve().name
 
 
 @dataclass(frozen=True)
@@ -175,6 +180,11 @@ def _named(found: Survey) -> Mapping[str, Problem]:
             remedy="open one set at a time: training and test sets number alike and are not one set",
         )
     return dict(zip(names, found.problems, strict=True))
+
+
+def _specs(found: Survey, chosen: Mapping[str, Problem]) -> list[PairSpec]:
+    poses = {archive: _source_poses(source) for archive, source in found.poses.items()}
+    return [_spec(name, problem, poses.get(problem.archive, {})) for name, problem in chosen.items()]
 
 
 def _spec(name: str, problem: Problem, poses: Mapping[str, str]) -> PairSpec:

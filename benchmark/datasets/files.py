@@ -57,7 +57,7 @@ class Tree:
 
     def name_of(self, folder: str) -> str:
         """Return what to call a folder of this tree: its own name, or that of the root."""
-        return folder.rpartition("/")[2] or _bare(self.root)
+        return folder.rpartition("/")[2] or bare_name(self.root)
 
     def place_of(self, folder: str) -> Path:
         """Return a folder of this tree as a path, for messages."""
@@ -139,6 +139,11 @@ def exists(source: FileSource) -> bool:
     return source.is_file() if isinstance(source, Path) else source.archive.is_file()
 
 
+def bare_name(root: Path) -> str:
+    """Return the name of a folder or archive, without the suffix of an archive."""
+    return root.resolve().stem if root.suffix.lower() == ".zip" else root.resolve().name
+
+
 def _members(path: Path) -> dict[str, FileSource]:
     with _opened(path) as archive:
         return {info.filename: Member(path, info.filename) for info in archive.infolist() if not info.is_dir()}
@@ -172,7 +177,3 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
 def _is_litter(name: str) -> bool:
     parts = name.split("/")
     return any(part.startswith(".") or part == "__MACOSX" for part in parts)
-
-
-def _bare(root: Path) -> str:
-    return root.resolve().stem if root.suffix.lower() == ".zip" else root.resolve().name

@@ -83,6 +83,14 @@ class PairSpec:
             },
         )
 
+    def load_part(self) -> Mesh:
+        """Read or build the part alone."""
+        return _mesh(self.part)
+
+    def load_full(self) -> Mesh:
+        """Read or build the full shape alone."""
+        return _mesh(self.full)
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PairData:
