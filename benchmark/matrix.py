@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import fields
 
 from nonrigid.benchmark.datasets.creatures import Creatures
+from nonrigid.benchmark.held_out import trained_for
 from nonrigid.benchmark.methods import make_method, methods
 from nonrigid.formulations.formulation import Formulation, Pair
 from nonrigid.formulations.model import Problem
@@ -31,12 +32,17 @@ def solver_matrix(
     UnknownNameError
         If a name is no method.
     """
-    data = next(spec for spec in Creatures().pairs() if spec.split == "holes").load()
+    specs = Creatures().pairs()
+    chosen = next(spec for spec in specs if spec.split == "holes")
+    data = chosen.load()
     pair = Pair.of(data.part, data.full)
     rows: list[dict[str, object]] = []
     for name in methods() if names is None else names:
-        usual = make_method(name, settings)
-        small = stated_problems(pair, make_method(name, {**(settings or {}), **_fewer(usual)}))
+        made = make_method(name, settings)
+        usual = trained_for(made, chosen, specs)
+        small = stated_problems(
+            pair, trained_for(make_method(name, {**(settings or {}), **_fewer(made)}), chosen, specs)
+        )
         for stage, problem in stated_problems(pair, usual).items():
             few = small.get(stage)
             answers = {} if few is None else {(r.backend, r.algorithm): str(r.acceptance) for r in route(few)}

@@ -60,15 +60,38 @@ def make_method(name: str, settings: Mapping[str, object] | None = None) -> Form
     if name not in methods():
         raise UnknownNameError("method", name, methods())
     kind = methods()[name]
+    made: Formulation = kind(**typed_settings(kind, settings or {}, owner=name))
+    return made
+
+
+def typed_settings(kind: type, settings: Mapping[str, object], *, owner: str | None = None) -> dict[str, Any]:
+    """Return settings of a dataclass, each value read as the type of its field.
+
+    Parameters
+    ----------
+    owner
+        How messages call the dataclass; its name by default.
+
+    Raises
+    ------
+    UnknownNameError
+        If the dataclass has no such field.
+    InputError
+        If a value does not fit the field.
+
+    Examples
+    --------
+    >>> typed_settings(methods()["gt"], {"kernel_width": "0.02"})
+    {'kernel_width': 0.02}
+    """
     types = get_type_hints(kind)
     known = [field.name for field in fields(kind) if field.init]
     chosen = {}
-    for key, value in (settings or {}).items():
+    for key, value in settings.items():
         if key not in known:
-            raise UnknownNameError(f"setting of {name}", key, known)
-        chosen[key] = _typed(f"{name}.{key}", value, types[key])
-    made: Formulation = kind(**chosen)
-    return made
+            raise UnknownNameError(f"setting of {owner or kind.__name__}", key, known)
+        chosen[key] = _typed(f"{owner or kind.__name__}.{key}", value, types[key])
+    return chosen
 
 
 def parse_settings(words: Sequence[str]) -> dict[str, str]:

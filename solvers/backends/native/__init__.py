@@ -14,6 +14,7 @@ from nonrigid.solvers.backend import Raw
 from nonrigid.solvers.backends.native.generalised_power import generalised_power
 from nonrigid.solvers.backends.native.infection_immunisation import infection_immunisation
 from nonrigid.solvers.backends.native.injective_maps import branch_and_bound, exhaustive
+from nonrigid.solvers.backends.native.least_squares import least_squares, regression
 from nonrigid.solvers.backends.native.limited_memory import limited_memory
 from nonrigid.solvers.backends.native.matching import matching
 from nonrigid.solvers.backends.native.pairwise_frank_wolfe import pairwise_frank_wolfe
@@ -33,7 +34,12 @@ _DYNAMICS = {
     "projected_gradient": projected_gradient,
     "generalised_power": generalised_power,
 }
-_GENERAL = {"limited_memory": limited_memory, "reweighted": reweighted, "procrustes": procrustes}
+_GENERAL = {
+    "limited_memory": limited_memory,
+    "reweighted": reweighted,
+    "procrustes": procrustes,
+    "least_squares": least_squares,
+}
 _PROVING = {"branch_and_bound": branch_and_bound, "exhaustive": exhaustive, "matching": matching}
 _MOST_MAPS = 5_000_000
 _SIMPLEX_ONLY = {"replicator", "infection_immunisation", "pairwise_frank_wolfe"}
@@ -61,6 +67,8 @@ class Native:
             return "generalised_power" if game.surface.mix > 0.0 else "projected_gradient"
         if not isinstance(robust_regression(problem), str):
             return "reweighted"
+        if not isinstance(regression(problem), str):
+            return "least_squares"
         if not isinstance(procrustes_gain(problem), str):
             return "procrustes"
         if not isinstance(triple_assignment(problem), str):
@@ -98,8 +106,8 @@ class Native:
         if self.algorithm == "procrustes":
             gain = procrustes_gain(problem)
             return f"it needs {gain}" if isinstance(gain, str) else None
-        regression = robust_regression(problem)
-        return f"it needs {regression}" if isinstance(regression, str) else None
+        known = regression(problem) if self.algorithm == "least_squares" else robust_regression(problem)
+        return f"it needs {known}" if isinstance(known, str) else None
 
     def run(self, oracle: Oracle, start: FloatArray, limits: Limits) -> Raw:
         """Run the algorithm."""

@@ -1,0 +1,1 @@
+"""Random forests that recognise the points of one full surface by the heat that stays near them."""
