@@ -208,6 +208,8 @@ def _dataset(word: str, settings: dict[str, Any], splits: tuple[str, ...], place
         settings["root"] = data or _root(settings.get("root"), place)
     elif data is not None:
         raise InputError(f"the data set {word} reads no files", remedy="leave out --data")
+    if "templates" in known and "templates" in settings:
+        settings["templates"] = place.parent / str(settings["templates"])
     if splits and "splits" in known:
         settings["splits"] = splits
     try:

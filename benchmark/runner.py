@@ -116,7 +116,8 @@ def _write_head(plan: Plan, store: Store, runs: Mapping[str, Sequence[Run]], wor
     with store.writing():
         write_text(store.folder / "plan.toml", plan.text)
         write_text(store.folder / "environment.json", json_text({**found, "jobs": workers}) + "\n")
-    store.write_index({"title": plan.title, "dataset": plan.data_word, "metric": plan.metric, "runs": labels})
+    head = {"title": plan.title, "dataset": plan.data_word, "data": plan.dataset.name, "metric": plan.metric}
+    store.write_index({**head, "runs": labels})
 
 
 def _hand_out(

@@ -55,7 +55,7 @@ def bench_command(
     if json:
         show_json(rows)
         return
-    show_summary(read.title, rows)
+    show_summary(f"{read.title}, on {read.dataset.name}", rows)
     say(f"{len(records)} runs in {out}; `nonrigid report {out}` writes tables and figures")
 
 
