@@ -91,8 +91,8 @@ def pack_colours(mesh: Mesh) -> str:
     return _text(place_colours(mesh), np.uint8)
 
 
-def first_view(mesh: Mesh) -> list[float]:
-    """Return the (3, 3) turn, row by row, from which a surface is seen first: broadside, upright, a little from above.
+def broadside(mesh: Mesh) -> tuple[int, int, int]:
+    """Return the axes that point to the eye, up and to the side where a surface shows itself best.
 
     One looks along the thinnest side of the bounding box. Files have up along z or y; where both are left, bodies are
     longer than high.
@@ -100,7 +100,12 @@ def first_view(mesh: Mesh) -> list[float]:
     size = np.ptp(mesh.vertices, axis=0)
     thin = int(np.argmin(size))
     up = {0: 1 if size[1] < size[2] else 2, 1: 2, 2: 1}[thin]
-    across = 3 - thin - up
+    return thin, up, 3 - thin - up
+
+
+def first_view(mesh: Mesh) -> list[float]:
+    """Return the (3, 3) turn, row by row, from which a surface is seen first: broadside, a little from above."""
+    _, up, across = broadside(mesh)
     rows = np.zeros((3, 3))
     rows[0, across] = rows[1, up] = 1.0
     rows[2] = np.cross(rows[0], rows[1])

@@ -136,6 +136,8 @@ def full_script(name: str, full: Mesh) -> str:
 def _run(record: Record, store: Store, data: PairData | None, blocks: dict[str, Any]) -> dict[str, Any]:
     """Return a run for the page, and add its matches to `blocks`: equal answers of several solvers stand there once."""
     run: dict[str, Any] = {key: record.get(key) for key in ("id", "label", "backend", "status", "message", "side")}
+    if store.log_file(record["id"]).is_file():
+        run["log"] = f"../../{store.log_file(record['id']).relative_to(store.folder).as_posix()}"
     run["stages"] = [
         {**{key: stage.get(key) for key in _STAGE}, "trace": [_short(point) for point in stage["trace"]]}
         for stage in record["stages"]

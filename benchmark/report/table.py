@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from nonrigid.benchmark.statistics.averages import shifted_geometric_mean
 from nonrigid.benchmark.store import Record
 
 COLUMNS: Mapping[str, str] = {
@@ -24,6 +25,7 @@ COLUMNS: Mapping[str, str] = {
     "coverage": "coverage",
     "build_seconds": "build s",
     "solve_seconds": "solve s",
+    "typical_seconds": "typical s",
     "status": "status",
 }
 """Keys of a summary row and their headings."""
@@ -31,7 +33,7 @@ COLUMNS: Mapping[str, str] = {
 WIDE = tuple(key for key in COLUMNS if key not in ("method", "split"))
 """Keys of a table of one method over all pairs."""
 
-BRIEF = tuple(key for key in WIDE if key not in ("mean_error_per_point_x100", "coverage"))
+BRIEF = tuple(key for key in WIDE if key not in ("mean_error_per_point_x100", "coverage", "typical_seconds"))
 """Those that fit a terminal."""
 
 EXPLAINED: Mapping[str, str] = {
@@ -46,6 +48,8 @@ EXPLAINED: Mapping[str, str] = {
     "coverage": "mean share of the part's area within 0.1 sqrt(full area) of a match",
     "build_seconds": "mean time to hand all problems of a pair to the backend",
     "solve_seconds": "mean time that the backend took for all problems of a pair",
+    "typical_seconds": "shifted geometric mean (shift 1 s) of building and solving over all pairs; a pair without a match "
+    "is an infinite cost",
     "status": "weakest status of a run's solves, and in how many runs; error: the method or the data failed, not the "
     "solver",
 }
@@ -186,8 +190,14 @@ def _row(label: str, backend: object, split: str, records: Sequence[Record]) -> 
         "coverage": _mean(records, "coverage"),
         "build_seconds": _mean(solved, "build_seconds"),
         "solve_seconds": _mean(solved, "solve_seconds"),
+        "typical_seconds": shifted_geometric_mean([_cost(record) for record in records]) if records else None,
         "status": ", ".join(f"{count} {status}" for status, count in statuses.most_common()),
     }
+
+
+def _cost(record: Record) -> float:
+    """Return the seconds of a run; inf for a failure."""
+    return float(record["build_seconds"] + record["solve_seconds"]) if record.get("match_count") else math.inf
 
 
 def _rank(row: Mapping[str, object]) -> tuple[float, float]:

@@ -185,7 +185,10 @@
       gl.disable(gl.DEPTH_TEST);
       this.drawPoints("marks", 0, 0.45, ratio);
       gl.enable(gl.DEPTH_TEST);
+      // The last mark lies above the others, wherever they are close together.
+      gl.depthMask(false);
       this.drawPoints("marks", 0.03, 1, ratio);
+      gl.depthMask(true);
       gl.disable(gl.BLEND);
     }
 
