@@ -147,13 +147,13 @@ def _map_sets(
             part, full = next((pair for pair in pairs if set(pair) <= set(shapes)), pairs[-1] if pairs else (stem, ""))
             fulls[full] += 1
             match = _PARTIAL.fullmatch(part)
-            split, _, class_name = full.rpartition("-")
+            split, dash, class_name = full.partition("-")
             tail = re.search(r"\d+$", part)
             problems.append(
                 Problem(
                     name=part if full in part or match else f"{part}_{full}",
-                    split=match["split"] if match else split or "all",
-                    class_name=match["class_name"] if match else class_name,
+                    split=match["split"] if match else split if dash else "all",
+                    class_name=match["class_name"] if match else class_name or full,
                     number=int(match["number"]) if match else int(tail[0]) if tail else fulls[full],
                     archive=tree.name_of(base),
                     layout="maps",
@@ -174,9 +174,7 @@ def _vts_sets(
         base = _parent(place)
         rows = folders.get(f"{base}/corres".lstrip("/"), {})
         vts = {stem: files[".vts"] for stem, files in rows.items() if ".vts" in files}
-        problems = list(_class_pairs(tree, base, meshes_of(folders[place]) | dict.fromkeys(vts), "vts", vts))
-        meshes = meshes_of(folders[place])
-        problems = [_with(problem, part=meshes.get(problem.name)) for problem in problems]
+        problems = list(_class_pairs(tree, base, {**dict.fromkeys(vts), **meshes_of(folders[place])}, "vts", vts))
         keep_complete(problems, found, tree, place, True, always=True)
         yield from (place, f"{base}/corres".lstrip("/"))
 
@@ -239,7 +237,3 @@ def _parent(place: str) -> str:
 
 def _natural(stem: str) -> list[tuple[int, int, str]]:
     return [(1, int(word), "") if word.isdigit() else (0, 0, word) for word in re.split(r"(\d+)", stem) if word]
-
-
-def _with(problem: Problem, *, part: FileSource | None) -> Problem:
-    return Problem(**{**vars(problem), "part": part})
