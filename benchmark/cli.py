@@ -19,6 +19,8 @@ from nonrigid.benchmark.commands.merge import merge_command
 from nonrigid.benchmark.commands.report import report_command
 from nonrigid.benchmark.commands.score import score_command
 from nonrigid.benchmark.commands.solvers import solvers_command
+from nonrigid.benchmark.commands.train import train_command
+from nonrigid.benchmark.commands.view import view_command
 from nonrigid.geometry.errors import NonrigidError
 
 # The exception at the root of what the option parser raises; its module has moved between versions of typer.
@@ -71,6 +73,8 @@ app.command("solvers")(solvers_command)
 app.command("bench")(bench_command)
 app.command("merge")(merge_command)
 app.command("report")(report_command)
+app.command("train")(train_command)
+app.command("view")(view_command)
 app.command("cite")(cite_command)
 app.add_typer(data_app, name="data")
 app.command("cache")(cache_command)
