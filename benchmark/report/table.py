@@ -48,7 +48,7 @@ EXPLAINED: Mapping[str, str] = {
     "coverage": "mean share of the part's area within 0.1 sqrt(full area) of a match",
     "build_seconds": "mean time to hand all problems of a pair to the backend",
     "solve_seconds": "mean time that the backend took for all problems of a pair",
-    "typical_seconds": "shifted geometric mean (shift 1 s) of building and solving over all pairs; a pair without a match "
+    "typical_seconds": "shifted geometric mean (shift 1 s) of building and solving over all pairs; one without a match "
     "is an infinite cost",
     "status": "weakest status of a run's solves, and in how many runs; error: the method or the data failed, not the "
     "solver",
