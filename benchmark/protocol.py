@@ -29,7 +29,8 @@ class Score:
     """Hold what one correspondence of one pair is worth.
 
     Errors are geodesic distances on the full shape over the square root of its area: fractions, to be multiplied by 100
-    when printed. Unmatched vertices are left out of every error and counted in `unmatched_count`.
+    when printed. Unmatched vertices are left out of every error and counted in `unmatched_count`, and so are matched
+    ones of which the truth is not known, in `unknown_count`.
 
     Parameters
     ----------
@@ -38,7 +39,7 @@ class Score:
     metric
         How distances were measured, see `geodesic_errors`.
     rows
-        (p,) the vertices of the part that have a match.
+        (p,) the vertices of the part that have a match and a known truth.
     direct, mirrored
         (p,) errors of these against the truth and against its mirror image (None where there is none).
     side
@@ -49,6 +50,8 @@ class Score:
         Mean of the smaller error at each point, the lenient secondary score. NaN without matches.
     match_count, unmatched_count
         Vertices with and without a match.
+    unknown_count
+        Vertices with a match that cannot be judged, since the ground truth does not say where they lie.
     coverage
         Fraction of the part's area within 0.1 sqrt(full area) of a matched vertex, along the part.
     curve
@@ -70,6 +73,7 @@ class Score:
     coverage: float
     curve: FloatArray
     kept_area: float
+    unknown_count: int = 0
 
     @property
     def errors(self) -> FloatArray:
@@ -92,7 +96,8 @@ def score(pair: PairData, points: SurfacePoints, *, geodesics: str = "dijkstra")
     Raises
     ------
     InputError
-        If the pair has no ground truth, or `points` has not one row a vertex of the part, or a matched vertex has none.
+        If the pair has no ground truth, or `points` has not one row a vertex of the part, or no matched vertex has
+        ground truth, or one has it on one side only.
 
     Source: Cosmo et al. 2016, "SHREC'16: Partial Matching of Deformable Shapes", section 4. Its text leaves open
     whether the better of the two sides is taken for a shape or for a point; both means are given.
@@ -105,13 +110,17 @@ def score(pair: PairData, points: SurfacePoints, *, geodesics: str = "dijkstra")
             remedy="give one row a vertex of the part, -1 where unmatched",
         )
     points.check(pair.full)
-    rows = np.flatnonzero(points.matched)
+    rows = np.flatnonzero(points.matched & pair.truth.matched)
+    if points.matched.any() and not len(rows):
+        raise InputError(f"no matched vertex of {pair.name} has ground truth", remedy="match vertices that have it")
     direct = geodesic_errors(pair.full, points[rows], pair.truth[rows], geodesics=geodesics)
     mirrored = None
     if pair.mirrored is not None:
         mirrored = geodesic_errors(pair.full, points[rows], pair.mirrored[rows], geodesics=geodesics)
     if np.isnan(direct).any() or (mirrored is not None and np.isnan(mirrored).any()):
-        raise InputError(f"a matched vertex of {pair.name} has no ground truth", remedy="leave it unmatched")
+        raise InputError(
+            f"a matched vertex of {pair.name} has ground truth on one side only", remedy="complete the ground truth"
+        )
     swapped = mirrored is not None and len(rows) > 0 and mirrored.mean() < direct.mean()
     chosen = mirrored if mirrored is not None and swapped else direct
     lenient = direct if mirrored is None else np.minimum(direct, mirrored)
@@ -124,9 +133,10 @@ def score(pair: PairData, points: SurfacePoints, *, geodesics: str = "dijkstra")
         side="mirrored" if swapped else "direct",
         mean_error=_mean(chosen),
         mean_error_per_point=_mean(lenient),
-        match_count=len(rows),
-        unmatched_count=len(points) - len(rows),
-        coverage=coverage(pair.part, rows, COVERAGE_RADIUS * np.sqrt(pair.full.area)),
+        match_count=int(points.matched.sum()),
+        unmatched_count=int((~points.matched).sum()),
+        unknown_count=int((points.matched & ~pair.truth.matched).sum()),
+        coverage=coverage(pair.part, np.flatnonzero(points.matched), COVERAGE_RADIUS * np.sqrt(pair.full.area)),
         curve=curve(chosen),
         kept_area=pair.kept_area,
     )

@@ -180,8 +180,20 @@ def test_rows_and_truth_that_do_not_fit_are_refused() -> None:
         replace(PAIR, truth=TRUTH[:3])
     with pytest.raises(InputError, match="no ground truth"):
         score(replace(PAIR, truth=None), TRUTH)
-    with pytest.raises(InputError, match="has no ground truth"):
-        score(replace(PAIR, truth=mixed(np.zeros(len(TRUTH), dtype=bool), np.arange(len(TRUTH)) == 2)), TRUTH)
+    known = replace(PAIR, truth=mixed(np.zeros(len(TRUTH), dtype=bool), np.arange(len(TRUTH)) == 2))
+    with pytest.raises(InputError, match="no matched vertex of piece has ground truth"):
+        score(known, mixed(np.zeros(len(TRUTH), dtype=bool), np.arange(len(TRUTH)) != 2))
+    with pytest.raises(InputError, match="on one side only"):
+        score(replace(PAIR, mirrored=known.truth), TRUTH)
+
+
+def test_vertices_without_truth_are_left_out_and_counted() -> None:
+    unknown = np.arange(len(TRUTH)) % 4 == 2
+    partial = replace(PAIR, truth=mixed(np.zeros(len(TRUTH), dtype=bool), unknown), mirrored=None)
+    result = score(partial, TRUTH)
+    assert result.mean_error == pytest.approx(0.0, abs=1e-9)
+    assert (result.match_count, result.unknown_count) == (len(TRUTH), unknown.sum())
+    assert len(result.rows) == len(result.errors) == (~unknown).sum()
 
 
 def test_scale_and_rigid_motion_of_either_surface_change_no_score() -> None:
