@@ -38,7 +38,7 @@ class Refused:
         raise InputError(self.reason)
 
 
-def tested_on(formulation: Formulation, spec: PairSpec) -> Formulation:
+def held_out_for(formulation: Formulation, spec: PairSpec) -> Formulation:
     """Return a formulation as it may be tested on a pair: one that learns has then seen nothing of the source pose.
 
     Where that cannot be, the result refuses the pair with the reason, and the refusal is a row of the results.
@@ -47,7 +47,7 @@ def tested_on(formulation: Formulation, spec: PairSpec) -> Formulation:
     --------
     >>> from nonrigid.benchmark.datasets.creatures import Creatures
     >>> from nonrigid.formulations.random_forest import RandomForest
-    >>> tested_on(RandomForest(), Creatures().pairs()[0]).reason
+    >>> held_out_for(RandomForest(), Creatures().pairs()[0]).reason
     'random forests need a trained forest; give forest=PATH; train one with `nonrigid train rf`'
     """
     if not isinstance(formulation, Learned):

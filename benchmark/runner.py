@@ -15,7 +15,7 @@ from nonrigid.benchmark.datasets.protocols import PairSpec
 from nonrigid.benchmark.environment import known_environment
 from nonrigid.benchmark.executors import Executor, Joblib
 from nonrigid.benchmark.formats import write_text
-from nonrigid.benchmark.held_out import tested_on
+from nonrigid.benchmark.held_out import held_out_for
 from nonrigid.benchmark.plan import Plan
 from nonrigid.benchmark.run import Run
 from nonrigid.benchmark.store import Record, Store
@@ -93,7 +93,7 @@ def plan_runs(plan: Plan, spec: PairSpec) -> list[Run]:
             class_name=spec.class_name,
             label=f"{entry.label} ({accuracy})" if accuracy else entry.label,
             method=entry.method,
-            formulation=tested_on(entry.formulation, spec),
+            formulation=held_out_for(entry.formulation, spec),
             backend=backend,
             starts=plan.starts,
             seed=plan.seed,

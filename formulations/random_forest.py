@@ -175,9 +175,9 @@ class RandomForest:
 
 
 def low_pass(rows: FloatArray, images: FloatArray, mass: FloatArray) -> Problem:
-    """Return min over C of the sum over p of m_p |C x_p - y_p|^2, up to a constant, in as few residuals as possible.
+    """Return min over C of the sum over p of m_p |C x_p - y_p|^2, in as few residuals as possible.
 
-    With X = diag(sqrt(m)) rows = Q R the sum is ||C R' - Y'Q||_F^2 and a part that does not depend on C.
+    With X = diag(sqrt(m)) rows = Q R and Y = diag(sqrt(m)) images the sum is ||C R' - Y'Q||_F^2 + |Y|^2 - |Y'Q|^2.
 
     Parameters
     ----------
@@ -197,9 +197,12 @@ def low_pass(rows: FloatArray, images: FloatArray, mass: FloatArray) -> Problem:
     """
     weight = np.sqrt(mass)[:, None]
     Q, R = np.linalg.qr(weight * rows)
+    Y = np.asarray(weight * images, dtype=np.float64)
+    reachable = Y.T @ Q
     C = Variable("C", (images.shape[1], rows.shape[1]))
-    residual = SquaredResidual(np.ascontiguousarray(R.T), np.asarray((weight * images).T @ Q, dtype=np.float64))
-    return Problem("low-pass", minimize(residual(C)), C @ free())
+    fit = minimize(SquaredResidual(np.ascontiguousarray(R.T), reachable)(C))
+    rest = max(float(np.sum(Y * Y) - np.sum(reachable * reachable)), 0.0)
+    return Problem("low-pass", replace(fit, constant=rest), C @ free())
 
 
 def _most_voted(votes: Any) -> IntArray:
