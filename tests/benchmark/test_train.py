@@ -26,17 +26,6 @@ POSES = {
 }
 SETTINGS = ("trees=3", "cells=20", "tests=20", "tries=10", "eigenfunctions=30")
 SMALL = tuple(word for setting in SETTINGS for word in ("--set", setting))
-    "--set",
-    "trees=3",
-    "--set",
-    "cells=20",
-    "--set",
-    "tests=20",
-    "--set",
-    "tries=10",
-    "--set",
-    "eigenfunctions=30",
-)
 
 
 @pytest.fixture(scope="module")
