@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from nonrigid.benchmark.datasets.checks import TORN_SHARE, torn_share
 from nonrigid.benchmark.datasets.protocols import Dataset, PairData
 from nonrigid.geometry.clean import clean
 from nonrigid.solvers.testing.errors import expect
@@ -11,8 +12,8 @@ def check_dataset(dataset: Dataset, *, pairs: int = 3) -> list[PairData]:
     """Load the first pairs of a data set, check them, and return them.
 
     Checked: names are unique and listed the same way twice; meshes can be repaired into one surface; the truth has one
-    point a vertex of the part, on faces of the full shape, and the mirrored truth too; the part is no larger than the
-    full shape; loading twice gives the same vertices.
+    point a vertex of the part, on faces of the full shape, and does not tear the part, and the mirrored truth too; the
+    part is no larger than the full shape; loading twice gives the same vertices.
 
     Raises
     ------
@@ -51,3 +52,5 @@ def _check_pair(pair: PairData) -> None:
         rows = len(pair.part.vertices)
         expect(len(points) == rows, pair.name, expected=f"{rows} rows of {role}", found=len(points), look=role)
         points.check(pair.full)
+        torn = torn_share(pair, points)
+        expect(torn <= TORN_SHARE, pair.name, expected=f"a {role} that does not tear", found=torn, look="row order")
