@@ -23,12 +23,21 @@ from nonrigid.formulations.model import (
     SmoothConstraint,
     Sphere,
     Variable,
+    free,
     maximize,
     minimize,
 )
 from nonrigid.formulations.model.assignment_sets import Assignment, PartialPermutation
+from nonrigid.formulations.model.terms.area_gap import AreaGap
+from nonrigid.formulations.model.terms.gram_penalty import GramPenalty
+from nonrigid.formulations.model.terms.group_norm import GroupNorm21
 from nonrigid.formulations.model.terms.linear import Linear
+from nonrigid.formulations.model.terms.masked_data import MaskedBasis, MaskedTarget
+from nonrigid.formulations.model.terms.membership import membership
+from nonrigid.formulations.model.terms.mumford_shah import MumfordShah
+from nonrigid.formulations.model.terms.squared_residual import SquaredResidual
 from nonrigid.formulations.model.terms.triple_distortion import TripleDistortion
+from nonrigid.formulations.model.terms.weighted_squares import WeightedSquares
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.testing.sets import HalfSquaredDistance
 
@@ -219,6 +228,99 @@ def transport() -> Instance:
     return Instance(problem=problem, optimum=6.0, values=values, certificate="column prices")
 
 
+def functional_map(*, orthogonality_weight: float = 0.05) -> Instance:
+    """Return a step of partial functional maps in C, each of whose terms is at its least at one signed diagonal map.
+
+    Descriptors come in threes that share a and whose targets lie about C a at angles of 120 degrees and distance h: the
+    sum of their residual lengths is least, 3 h, where the residuals' directions cancel. The mask is 0 on the diagonal,
+    and C'C = diag(d). Without the penalty of the Gram matrix the problem is convex.
+    """
+    rng = np.random.default_rng(3)
+    size, rank, height, weight = 4, 3, 0.4, 0.2
+    C = np.diag([1.0, -1.0, 1.0, 0.0])
+    sources, targets = [], []
+    for a in 0.5 * rng.standard_normal((6, size)):
+        plane = np.linalg.qr(rng.standard_normal((size, 2)))[0]
+        for angle in 2.0 * np.pi * np.arange(3) / 3.0:
+            sources.append(a)
+            targets.append(C @ a - height * (plane @ [np.cos(angle), np.sin(angle)]))
+    A, B = np.array(sources).T, np.array(targets).T
+    unknown = Variable("C", (size, size))
+    energy = weight * GroupNorm21(A, B)(unknown) + 0.1 * WeightedSquares(1.0 - np.eye(size))(unknown)
+    if orthogonality_weight:
+        energy = energy + orthogonality_weight * GramPenalty((np.arange(size) < rank).astype(float))(unknown)
+    return Instance(
+        problem=Problem(
+            "functional map" if orthogonality_weight else "robust regression", minimize(energy), unknown @ free()
+        ),
+        optimum=weight * height * len(sources),
+        values={"C": C},
+        certificate="each term at its least",
+        unimodal=not orthogonality_weight,
+    )
+
+
+def robust_regression() -> Instance:
+    """Return the convex part of `functional_map`."""
+    return functional_map(orthogonality_weight=0.0)
+
+
+def region() -> Instance:
+    """Return a step of partial functional maps in v, each of whose terms is at its least at one constant field.
+
+    A descriptor lives on three vertices, so that some unit vector w is orthogonal to their basis rows; the target is
+    the image of the constant field plus h w. The residual is then nowhere shorter than h, and the field has no edge.
+    """
+    rng = np.random.default_rng(5)
+    side, basis_size, height = 3, 4, 0.3
+    x, y = np.meshgrid(np.arange(side, dtype=float), np.arange(side, dtype=float))
+    corner = np.arange(side * side).reshape(side, side)
+    a, b, c, d = (part.ravel() for part in (corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]))
+    vertices = np.c_[x.ravel(), y.ravel(), 0.1 * x.ravel() * y.ravel()]
+    faces = np.concatenate([np.c_[a, b, c], np.c_[a, c, d]])
+    n = len(vertices)
+    basis, mass = rng.standard_normal((n, basis_size)), rng.uniform(0.5, 1.0, n)
+    functions, normals = np.zeros((n, n)), np.zeros((basis_size, n))
+    for j in range(n):
+        held = (j + np.arange(3)) % n
+        functions[held, j] = rng.uniform(0.5, 1.5, 3)
+        normals[:, j] = np.linalg.svd(basis[held])[2][-1]
+    constant = np.full(n, 0.6)
+    whole = MaskedBasis(basis, mass, functions)
+    inside = membership(constant)
+    v = Variable("v", n)
+    energy = (
+        MaskedTarget(whole.project(inside) + height * normals, whole)(v)
+        + 0.5 * AreaGap(mass, float(mass @ inside))(v)
+        + 0.01 * MumfordShah(vertices, faces)(v)
+    )
+    return Instance(
+        problem=Problem("region", minimize(energy), v @ free()),
+        optimum=height * n,
+        values={"v": constant},
+        certificate="each term at its least",
+        unimodal=False,
+    )
+
+
+def spectral_low_pass() -> Instance:
+    """Return the fit of a functional map to a forest's votes: B = C A + N with N orthogonal to the rows of A.
+
+    Then ||X A - B||^2 = ||(X - C) A||^2 + ||N||^2, least at X = C, alone since A has full row rank.
+    """
+    rng = np.random.default_rng(4)
+    rows = np.linalg.qr(rng.standard_normal((6, 4)))[0].T
+    C = rng.standard_normal((3, 2))
+    A, N = np.array([[1.0, 0.3], [0.0, 0.8]]) @ rows[:2], 0.5 * rng.standard_normal((3, 2)) @ rows[2:]
+    unknown = Variable("C", C.shape)
+    return Instance(
+        problem=Problem("low-pass", minimize(SquaredResidual(A, C @ A + N)(unknown)), unknown @ free()),
+        optimum=float(np.sum(N * N)),
+        values={"C": C},
+        certificate="residual orthogonal to the data",
+    )
+
+
 class SquaredGap(Applicable):
     """Evaluate |x - y|^2 in two arguments."""
 
@@ -245,4 +347,8 @@ _MAKERS: tuple[Callable[[], Instance], ...] = (
     two_variables,
     injective_map,
     transport,
+    spectral_low_pass,
+    robust_regression,
+    functional_map,
+    region,
 )

@@ -17,7 +17,7 @@ from nonrigid.formulations.model.terms.triple_distortion import TripleDistortion
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.acceptance import Acceptance, Native, Refused
 from nonrigid.solvers.backend import Raw, make_backend
-from nonrigid.solvers.bounds.bound import bound
+from nonrigid.solvers.bounds.bound import BoundError, bound
 from nonrigid.solvers.bridges.pair_lift import PairLift
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.oracle import Oracle
@@ -126,3 +126,13 @@ def test_a_bound_beyond_the_answer_is_dropped_and_said_to_be_refuted() -> None:
     assert answer.status is not Status.CERTIFIED
     assert answer.bound is None
     assert "refuted" in answer.message
+
+
+def test_trying_every_map_is_a_bound_that_meets_the_optimum() -> None:
+    problem = triple_problem(5, 10, 3, weight=2.0)
+    proved = bound(problem, "exhaustive")
+    assert solve(problem, "native:branch_and_bound").objective == pytest.approx(proved.value, rel=1e-12)
+    assert "30240 maps" in proved.detail
+    assert bound(problem, "exhaustive", seconds=1e-9).value <= proved.value
+    with pytest.raises(BoundError, match="at most 1000000 maps"):
+        bound(triple_problem(7, 13, 0), "exhaustive")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import version
 from typing import Any, ClassVar
@@ -11,6 +11,7 @@ import cvxpy
 
 from nonrigid.formulations.model import Curvature, Problem
 from nonrigid.formulations.model.binary_sets import integral_entries
+from nonrigid.formulations.model.terms.group_norm import GroupNorm21
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.acceptance import Acceptance, Native, Refused, Via, via
 from nonrigid.solvers.backend import Raw
@@ -18,6 +19,7 @@ from nonrigid.solvers.backends.cvxpy.lowering import Lowered, is_convex, set_obs
 from nonrigid.solvers.backends.cvxpy.settings import CONIC, NONLINEAR, QUADRATIC, convex_options, nonlinear_options
 from nonrigid.solvers.backends.cvxpy.successive import successive
 from nonrigid.solvers.bridges.body import ToBody
+from nonrigid.solvers.bridges.cells import RegionCells
 from nonrigid.solvers.bridges.hull import ToHull
 from nonrigid.solvers.bridges.pair_lift import PairLift
 from nonrigid.solvers.limits import Limits
@@ -34,8 +36,9 @@ class Cvxpy:
     """Solve problems by the solvers that CVXPY drives.
 
     A problem that declares itself convex, and that CVXPY verifies to be so from the formulas of its terms, is solved
-    once; any other by a sequence of convex models (`nonrigid.solvers.backends.cvxpy.successive`). The algorithms
-    nlp-UNO and nlp-IPOPT hand the formulas to CVXPY's nonlinear mode.
+    once; any other by a sequence of convex models (`nonrigid.solvers.backends.cvxpy.successive`). The region of a
+    partial functional map, one unknown a vertex, is held constant on cells (`nonrigid.solvers.bridges.cells`). The
+    algorithms nlp-UNO and nlp-IPOPT hand the formulas to CVXPY's nonlinear mode.
 
     Parameters
     ----------
@@ -69,6 +72,8 @@ class Cvxpy:
                 return Via((PairLift(),))
             if not branches or problem.curvature is not Curvature.AFFINE:
                 return Via((ToHull(),))
+        if RegionCells().obstacle(problem) is None:
+            return Via((RegionCells(),))
         obstacle = set_obstacle(problem, quadratic=self.algorithm in CONIC, integral=branches)
         if obstacle is not None:
             return Refused(f"{self.algorithm}: {obstacle}")
@@ -86,7 +91,7 @@ class Cvxpy:
             return self._nonlinear(lowered, oracle, start, limits)
         if is_convex(oracle.problem):
             program = cp.Problem(cp.Minimize(lowered.objective()), lowered.constraints)
-            if program.is_dcp():
+            if program.is_dcp() and (self.algorithm in CONIC or program.is_qp()):
                 return self._once(program, lowered, oracle, limits)
         x, words = successive(lowered, oracle, start, self.algorithm, limits)
         return Raw(x, words)
@@ -100,7 +105,14 @@ class Cvxpy:
         program.get_problem_data(self.algorithm)
         oracle.built()
         options = convex_options(self.algorithm, limits, limits.seconds)
-        return _answer(solve_quietly(program, solver=self.algorithm, **options), lowered, oracle)
+        words = solve_quietly(program, solver=self.algorithm, **options)
+        if lowered.point() is None and words.startswith("solver error"):
+            # Asked for more digits than it has, an interior-point solver may end with none: ask for fewer.
+            oracle.charge(0.0)
+            left = None if limits.seconds is None else limits.seconds - oracle.seconds
+            options = convex_options(self.algorithm, replace(limits, tolerance=1e-2, feasibility=1e-3), left)
+            words = solve_quietly(program, solver=self.algorithm, **options)
+        return _answer(words, lowered, oracle)
 
     def _nonlinear(self, lowered: Lowered, oracle: Oracle, start: FloatArray, limits: Limits) -> Raw:
         program = cp.Problem(cp.Minimize(lowered.objective()), lowered.constraints)
@@ -117,6 +129,8 @@ class Cvxpy:
         for applied in problem.objective.terms:
             if not hasattr(applied.term, "lower"):
                 return Refused(f"{self.algorithm}: it needs the formula of every term, and {applied} has no `lower`")
+            if isinstance(applied.term, GroupNorm21):
+                return Refused(f"{self.algorithm}: CVXPY's nonlinear mode knows no norms of columns; use casadi:ipopt")
         obstacle = set_obstacle(problem, quadratic=True)
         if obstacle is None and size_of(problem) > _LARGEST_NONLINEAR:
             obstacle = (

@@ -11,7 +11,7 @@ import numpy as np
 from nonrigid.formulations.model import Applied
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.backends.cvxpy.lowering import Lowered, keeps, solve_quietly
-from nonrigid.solvers.backends.cvxpy.settings import convex_options
+from nonrigid.solvers.backends.cvxpy.settings import CONIC, convex_options
 from nonrigid.solvers.judge import restore
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.oracle import Oracle
@@ -45,11 +45,15 @@ class _Model:
         objective = linear + 0.5 * lowered.squares()
         self.inverse = cp.Parameter(nonneg=True)
         for applied in oracle.problem.objective.terms:
-            if keeps(applied, lowered.sign) and (expression := lowered.term(applied)).is_convex():
+            if keeps(applied, lowered.sign) and _takes(algorithm, expression := lowered.term(applied)):
                 self.kept.append(applied)
                 objective = objective + self.inverse * expression
         self.status = "not solved"
-        self.program = cp.Problem(cp.Minimize(objective), lowered.constraints)
+        constraints = lowered.constraints
+        if algorithm == "SCS" and not constraints:  # it takes no program without rows
+            unused = cp.Variable()
+            objective, constraints = objective + unused, [unused >= 0]
+        self.program = cp.Problem(cp.Minimize(objective), constraints)
 
     def compile(self, x: FloatArray) -> None:
         """Translate the program once, so that the solves only exchange vectors."""
@@ -89,6 +93,11 @@ class _Model:
         self.inverse.value = 1.0 / weight
         for name, value in self.lowered.layout.split(rest / weight - x).items():
             self.slopes[name].value = value
+
+
+def _takes(algorithm: str, expression: Any) -> bool:
+    """Whether a solver takes an expression within its convex model: solvers of quadratic programs know no cones."""
+    return bool(expression.is_convex() and (algorithm in CONIC or expression.is_quadratic()))
 
 
 def successive(
