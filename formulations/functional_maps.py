@@ -6,6 +6,10 @@ import numpy as np
 
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.maps import nearest_rows
+from nonrigid.geometry.spectrum import Spectrum
+
+SPREAD = 0.03
+"""Length, in units of sqrt(full area), over which matches are spread to find the region they lie in."""
 
 ENOUGH = 5e-6
 """Fall of the mean feature distance below which the closest-point iteration ends."""
@@ -60,6 +64,52 @@ def diagonal_start(mask: FloatArray, rank: int) -> FloatArray:
     C = 1.0 - mask / largest if largest > 0.0 else np.ones_like(mask)
     gram = C.T @ C
     return np.asarray(C * np.sqrt(gram.diagonal()[:rank].sum() / np.sum(gram * gram)))
+
+
+def orthonormal_map(part: FloatArray, full: FloatArray, *, passes: int = 8) -> FloatArray:
+    """Return the map D with D'D = I, (k, r), that takes most rows x_p of `part` near the rows y_p matched with them.
+
+    Minimizes sum_p w_p |D x_p - y_p|^2, `passes` times with w_p = 1 / max(d_p, 0.3 median d)^2 from the last distances
+    d_p, so that wrong matches, which lie far off, count little. Rows: (p, r) and (p, k), r <= k.
+
+    Examples
+    --------
+    >>> turn = np.array([[0.6, -0.8], [0.8, 0.6]])
+    >>> points = np.array([[1.0, 0.0], [0.0, 2.0], [-3.0, 1.0], [2.0, 2.0], [1.0, -1.0]])
+    >>> matched = points @ turn.T
+    >>> matched[0] = [9.0, 9.0]  # wrong
+    >>> orthonormal_map(points, matched).round(2) + 0.0
+    array([[ 0.6, -0.8],
+           [ 0.8,  0.6]])
+    """
+    weights = np.ones(len(part))
+    for _ in range(passes + 1):
+        left, _, right = np.linalg.svd((full * weights[:, None]).T @ part, full_matrices=False)
+        D = left @ right
+        apart = np.linalg.norm(part @ D.T - full, axis=1)
+        weights = 1.0 / np.maximum(apart, max(0.3 * float(np.median(apart)), 1e-12)) ** 2
+    return np.asarray(D)
+
+
+def region_of_matches(matches: IntArray, weights: FloatArray, full: Spectrum, area: float) -> FloatArray:
+    """Return 1 on the region of the whole, of a given area, where most matches lie once they are spread out; 0 off it.
+
+    The matched vertices, with their weights, (p,), are spread by the heat kernel at time 0.03^2, areas and lengths in
+    units of the full area and its root; the region is where the heat is largest.
+
+    Examples
+    --------
+    >>> whole = Spectrum(np.array([0.0]), np.ones((2, 1)), np.array([0.5, 0.5]))
+    >>> region_of_matches(np.array([1]), np.ones(1), whole, 1.0)
+    array([1., 1.])
+    """
+    E = full.eigenfunctions
+    heat = E @ (np.exp(-(SPREAD**2) * full.eigenvalues) * (np.bincount(matches, weights, len(E)) @ E))
+    order = np.argsort(-heat, kind="stable")
+    inside = np.searchsorted(np.cumsum(full.mass[order]), area)
+    region = np.zeros(len(E))
+    region[order[: inside + 1]] = 1.0
+    return region
 
 
 def spectral_closest_points(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Generator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -14,6 +14,8 @@ from nonrigid.formulations.functional_maps import (
     diagonal_start,
     estimated_rank,
     matched_rows,
+    orthonormal_map,
+    region_of_matches,
     slanted_mask,
     spectral_closest_points,
 )
@@ -27,9 +29,12 @@ from nonrigid.formulations.model.terms.weighted_squares import WeightedSquares
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.errors import InputError, UnknownNameError
 from nonrigid.geometry.geodesics import make_geodesics
+from nonrigid.geometry.maps import nearest_rows
 from nonrigid.geometry.spectrum import Spectrum
 
-Start = Literal["mask", "anchors"]
+Start = Literal["several", "mask", "descriptors", "anchors"]
+_STARTS = ("several", "mask", "descriptors", "anchors")
+_TRIAL = 2  # rounds after which starts are compared: one region found for each
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,8 +58,15 @@ class PartialFunctionalMap:
     radii
         Radii of the SHOT descriptors, in units of sqrt(full area).
     start
-        "mask": C is large where W is small, as published but for its scale; see `diagonal_start`. "anchors": the first
-        run uses landmarks instead of descriptors, the matches of `GameTheoretic`.
+        Where the first run begins. "mask": C is large where W is small, as published but for its scale; see
+        `diagonal_start`; the region is the whole. "descriptors": C is the robust orthonormal map of the nearest
+        descriptors at the last of `start_radii`, the region where most of them lie. "several": the former, and the
+        latter at each of `start_radii`, run for two rounds each; the one whose last step in C ends lowest goes on.
+        "anchors": as "mask", with landmarks instead of descriptors, the matches of `GameTheoretic`.
+    start_radii
+        Radii of the SHOT descriptors that starts are made from, in units of sqrt(full area).
+    start_samples
+        Number of samples of the part whose nearest descriptors make a start.
     mask_weight, orthogonality_weight, area_weight, edge_weight
         Weights for a full surface of area 1. The published ones, 1, 1e3, 1 and 1e2, hold for an area of about 1.75e4:
         lengths there are 132 times longer, and the terms change as its powers 0, 0, 4 and 1, the data as its power 1.
@@ -79,7 +91,9 @@ class PartialFunctionalMap:
 
     eigenfunctions: int = 90
     radii: tuple[float, ...] = (0.04,)
-    start: Start = "mask"
+    start: Start = "several"
+    start_radii: tuple[float, ...] = (0.04, 0.10)
+    start_samples: int = 1000
     mask_weight: float = 7.6e-3
     orthogonality_weight: float = 7.6
     area_weight: float = 2.3e6
@@ -96,25 +110,30 @@ class PartialFunctionalMap:
 
     def stages(self, pair: Pair) -> Stages:
         """State the problems in C and in v by turns; return one match a vertex of the part."""
-        if self.start not in ("mask", "anchors"):
-            raise UnknownNameError("start", self.start, ("mask", "anchors"))
-        for name in ("eigenfunctions", "rounds", "closest_point_samples"):
-            if getattr(self, name) < 1:
-                raise InputError(f"{name} is {getattr(self, name)}", remedy="give a number of at least 1")
+        self._check()
         bases = Bases.of(pair, self.eigenfunctions, self.closest_point_samples)
-        C = diagonal_start(slanted_mask(bases.size, bases.rank), bases.rank)
         if self.start == "anchors":
             anchors = yield from GameTheoretic().stages(pair)
             descriptors = self._near(pair, *_vertices(pair, anchors))
         else:
             descriptors = describe(pair.part, self.radii), describe(pair.full, self.radii)
-        C = yield from self._alternate(pair, bases, descriptors, C)
+        joint = self.joint(pair, bases, descriptors)
+        starts = self._starts(pair, bases)
+        tried = []
+        for start in starts:
+            tried.append((yield from self._alternate(joint, bases, start, _TRIAL if len(starts) > 1 else self.rounds)))
+        kept = min(tried, key=lambda state: state.energy)
+        if len(starts) > 1 and not kept.ended:
+            kept = yield from self._alternate(joint, bases, kept, self.rounds - _TRIAL)
         if self.landmarks:
             chosen = pair.part.samples(min(self.landmarks, len(pair.part.mesh.vertices)))
-            found = matched_rows(C[:, : bases.rank], bases.part.eigenfunctions[chosen, : bases.rank], bases.full_rows)
-            C = yield from self._alternate(pair, bases, self._near(pair, chosen, found), C)
-        matches = matched_rows(C[:, : bases.rank], bases.part.eigenfunctions[:, : bases.rank], bases.full_rows)
-        return Correspondence.between_vertices(pair, np.arange(len(matches)), matches)
+            found = bases.matched(kept.C, chosen)
+            again = _State(C=kept.C, v=np.ones_like(kept.v))
+            kept = yield from self._alternate(
+                self.joint(pair, bases, self._near(pair, chosen, found)), bases, again, self.rounds
+            )
+        everywhere = np.arange(len(pair.part.mesh.vertices))
+        return Correspondence.between_vertices(pair, everywhere, bases.matched(kept.C, everywhere))
 
     def joint(self, pair: Pair, bases: Bases, descriptors: tuple[FloatArray, FloatArray]) -> Problem:
         """Return the problem in C and v for descriptors (n, q) of the part and of the whole."""
@@ -132,24 +151,49 @@ class PartialFunctionalMap:
             energy = energy + self.orthogonality_weight * GramPenalty(wanted)(C)
         return Problem("partial functional map", minimize(energy), C @ free(), v @ free())
 
+    def _check(self) -> None:
+        if self.start not in _STARTS:
+            raise UnknownNameError("start", self.start, _STARTS)
+        for name in ("eigenfunctions", "rounds", "closest_point_samples", "start_samples"):
+            if getattr(self, name) < 1:
+                raise InputError(f"{name} is {getattr(self, name)}", remedy="give a number of at least 1")
+        if self.start in ("several", "descriptors") and not self.start_radii:
+            raise InputError(f"start_radii is empty and start {self.start!r}", remedy="give a radius, such as 0.1")
+
+    def _starts(self, pair: Pair, bases: Bases) -> list[_State]:
+        """Return the maps and regions that the first run begins with."""
+        everything = np.ones(len(bases.full.mass))
+        mask = _State(C=diagonal_start(slanted_mask(bases.size, bases.rank), bases.rank), v=everything)
+        if self.start in ("mask", "anchors"):
+            return [mask]
+        if self.start == "descriptors":
+            return [self._of_descriptors(pair, bases, self.start_radii[-1])]
+        return [mask, *(self._of_descriptors(pair, bases, radius) for radius in self.start_radii)]
+
+    def _of_descriptors(self, pair: Pair, bases: Bases, radius: float) -> _State:
+        """Return the orthonormal map and the region of the nearest descriptors of samples."""
+        chosen = pair.part.samples(min(self.start_samples, len(pair.part.mesh.vertices)))
+        found, _ = nearest_rows(describe(pair.part, (radius,))[chosen], describe(pair.full, (radius,)))
+        C = bases.padded(orthonormal_map(bases.part.eigenfunctions[chosen, : bases.rank], bases.full_rows[found]))
+        weights = bases.part.mass[chosen]
+        return _State(C=C, v=region_of_matches(found, weights, bases.full, float(bases.part.mass.sum())))
+
     def _alternate(
-        self, pair: Pair, bases: Bases, descriptors: tuple[FloatArray, FloatArray], C: FloatArray
-    ) -> Generator[Problem, Solved, FloatArray]:
-        """Solve for C and for v by turns while the former's energy falls; return the last orthonormal map kept."""
-        joint = self.joint(pair, bases, descriptors)
-        v = np.ones(len(bases.full.mass))
-        energy, kept = np.inf, C
-        for number in range(self.rounds):
-            solved = yield joint.fix(v=v).stage("C", start={"C": C}, evaluations=self.map_evaluations)
-            if solved.objective >= energy:
-                break
-            energy = solved.objective
-            C = kept = bases.orthonormal(solved["C"], self.closest_point_iterations)
-            if number < self.rounds - 1:
-                image = bases.full.eigenfunctions @ (C @ bases.part.project(np.ones(len(bases.part.mass))))
-                solved = yield joint.fix(C=C).stage("v", start={"v": image}, evaluations=self.region_evaluations)
+        self, joint: Problem, bases: Bases, state: _State, rounds: int
+    ) -> Generator[Problem, Solved, _State]:
+        """Solve for v, unless it is given with the start, and for C by turns, while the energy of C falls."""
+        for _ in range(rounds):
+            v = state.v
+            if state.mapped:
+                image = bases.full.eigenfunctions @ (state.C @ bases.part.project(np.ones(len(bases.part.mass))))
+                solved = yield joint.fix(C=state.C).stage("v", start={"v": image}, evaluations=self.region_evaluations)
                 v = solved["v"]
-        return kept
+            solved = yield joint.fix(v=v).stage("C", start={"C": state.C}, evaluations=self.map_evaluations)
+            if solved.objective >= state.energy:
+                return replace(state, ended=True)
+            C = bases.orthonormal(solved["C"], self.closest_point_iterations)
+            state = _State(C=C, v=v, energy=solved.objective if state.mapped else np.inf, mapped=True)
+        return state
 
     def _near(self, pair: Pair, part: IntArray, full: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return functions that fall off exponentially from matched vertices, one a match, on either surface."""
@@ -190,9 +234,29 @@ class Bases:
         """Return the map that closest points make of C: orthonormal columns up to the rank, zeros beyond it."""
         rows = self.part.eigenfunctions[self.samples, : self.rank]
         D, _ = spectral_closest_points(C[:, : self.rank], rows, self.full_rows, iterations=iterations)
-        padded = np.zeros_like(C)
-        padded[:, : self.rank] = D
-        return padded
+        return self.padded(D)
+
+    def padded(self, D: FloatArray) -> FloatArray:
+        """Return the (k, k) map of a (k, rank) one: zeros beyond the rank."""
+        return np.hstack([D, np.zeros((self.size, self.size - self.rank))])
+
+    def matched(self, C: FloatArray, part: IntArray) -> IntArray:
+        """Return, for vertices of the part, the vertex of the whole nearest to their image."""
+        return matched_rows(C[:, : self.rank], self.part.eigenfunctions[part, : self.rank], self.full_rows)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class _State:
+    """Hold a map, its region, and the energy that its step in C ended with, infinite until a region is solved for.
+
+    `mapped`: a step in C has been taken; `ended`: the next one would end no lower.
+    """
+
+    C: FloatArray
+    v: FloatArray
+    energy: float = np.inf
+    mapped: bool = False
+    ended: bool = False
 
 
 def _vertices(pair: Pair, matches: Correspondence) -> tuple[IntArray, IntArray]:
