@@ -24,7 +24,7 @@ def check_dataset(dataset: Dataset, *, pairs: int = 3) -> list[PairData]:
     --------
     >>> from nonrigid.benchmark.datasets.creatures import Creatures
     >>> [pair.name for pair in check_dataset(Creatures(vertices=600), pairs=1)]
-    ['cuts_fox_shape_1']
+    ['cuts_anton_shape_1']
     """
     specs = list(dataset.pairs())
     names = [spec.name for spec in specs]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import product
 
 import igl
 import numpy as np
@@ -12,6 +13,9 @@ from nonrigid.geometry.arrays import FloatArray
 from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.points import SurfacePoints
+
+BRICK = 16
+"""Grid points along each side of the bricks in which a field is evaluated."""
 
 
 def closest_points(mesh: Mesh, positions: FloatArray) -> SurfacePoints:
@@ -44,7 +48,7 @@ def isosurface(
     Parameters
     ----------
     field
-        From (p, 3) positions to (p,) values, negative inside.
+        From (p, 3) positions to (p,) values, negative inside. It is asked brick by brick, for places near each other.
     lower, upper
         Two corners of a box; the surface is closed if it stays inside.
     spacing
@@ -65,8 +69,15 @@ def isosurface(
     size = np.ceil((np.asarray(upper, dtype=float) - low) / spacing).astype(int) + 1
     ax, ay, az = (low[axis] + spacing * np.arange(size[axis]) for axis in range(3))
     z, y, x = np.meshgrid(az, ay, ax, indexing="ij")
-    grid = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
-    vertices, faces, _ = igl.marching_cubes(field(grid), grid, *(int(count) for count in size), 0.0)
+    grid = np.stack([x, y, z], axis=3)
+    values = np.empty(z.shape)
+    # Brick by brick: a field made of many parts can leave out those that are far from a brick.
+    for brick in product(*(range(0, count, BRICK) for count in z.shape)):
+        here = tuple(slice(start, start + BRICK) for start in brick)
+        places = grid[here]
+        values[here] = field(places.reshape(-1, 3)).reshape(places.shape[:3])
+    counts = (int(count) for count in size)
+    vertices, faces, _ = igl.marching_cubes(values.ravel(), grid.reshape(-1, 3), *counts, 0.0)
     if not len(faces):
         raise InputError("the field has one sign on the whole grid", remedy="give a box around the surface")
     return Mesh(vertices, faces, name=name)

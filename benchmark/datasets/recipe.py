@@ -1,167 +1,59 @@
-"""Make partial shapes of complete ones: cut by a plane, or eaten by growing holes."""
+"""Make a partial-matching data set of any folder of dense meshes in several poses."""
 
 from __future__ import annotations
 
-import heapq
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
 
-import numpy as np
-from scipy.sparse.csgraph import dijkstra
-
-from nonrigid.geometry.arrays import BoolArray, FloatArray, IntArray
+from nonrigid.benchmark.datasets.dense import DenseClass, dense_classes
+from nonrigid.benchmark.datasets.parts import part_pairs
+from nonrigid.benchmark.datasets.protocols import PairSpec
 from nonrigid.geometry.errors import InputError
-from nonrigid.geometry.geodesics import virtual_edge_graph
-from nonrigid.geometry.mesh import Mesh
-from nonrigid.geometry.partial import largest_piece
-from nonrigid.geometry.points import SurfacePoints
-from nonrigid.geometry.sampling import farthest_points
 
 
-def cut_planes(template: Mesh, count: int, seed: int) -> tuple[FloatArray, FloatArray]:
-    """Draw planes through points near the centroid of the template.
+@dataclass(frozen=True, kw_only=True)
+class Recipe:
+    """Offer cuts and holes of posed meshes by the recipe of SHREC'16: remesh first, cut after.
 
-    Returns
-    -------
-    (count, 3) points, within a tenth of sqrt(area) of the area's centroid in each coordinate, in the unit of the mesh;
-    (count, 3) unit normals, uniform over all directions.
-    """
-    generator = np.random.default_rng(seed)
-    centres = template.vertices[template.faces].mean(axis=1)
-    centroid = np.average(centres, axis=0, weights=template.face_areas)
-    points = centroid + 0.1 * np.sqrt(template.area) * generator.uniform(-1.0, 1.0, size=(count, 3))
-    normals = generator.normal(size=(count, 3))
-    return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
-
-
-def cut_by_plane(
-    mesh: Mesh, truth: SurfacePoints, template: Mesh, *, point: FloatArray, normal: FloatArray
-) -> BoolArray:
-    """Keep what lies on the normal's side of a plane through the template, carried over to a pose by the ground truth.
-
-    A vertex of the pose is on the side on which its true point of the template is; a triangle is kept if all its
-    corners are, so that the boundary follows the triangles. Of the pieces, joined through edges, the largest is kept.
+    The folder holds meshes called `<class><number>` whose vertices correspond by number inside a class, as in TOSCA;
+    the lowest number is the template.
 
     Parameters
     ----------
-    mesh
-        The pose, with n vertices and m faces.
-    truth
-        (n,) the points of the template they correspond to.
-
-    Returns
-    -------
-    (m,) whether each face is kept.
+    root
+        The folder.
+    vertices
+        Vertices of each remeshed complete shape; SHREC'16 has 10 000.
+    seed
+        For planes, borders of holes and the numbering.
 
     Raises
     ------
     InputError
-        If nothing is left.
+        If the folder holds no class with two poses, or fewer than 4 vertices are asked for.
+
+    Source: Cosmo, Rodola, Bronstein, Torsello, Cremers, Sahillioglu, "SHREC'16: Partial Matching of Deformable Shapes",
+    Eurographics Workshop on 3D Object Retrieval 2016.
     """
-    kept_vertex = (truth.positions(template) - point) @ normal > 0
-    kept = kept_vertex[mesh.faces].all(axis=1)
-    if not kept.any():
-        raise InputError(f"the plane leaves nothing of {mesh.name}", remedy="move it towards the centroid")
-    return largest_piece(mesh, kept)
 
+    root: Path
+    vertices: int = 10_000
+    seed: int = 0
 
-def grow_holes(mesh: Mesh, *, holes: int, keep: float, seed: int, jitter: float = 0.35) -> BoolArray:
-    """Grow holes from points far from each other until a given fraction of the area is left.
+    def __post_init__(self) -> None:
+        if self.vertices < 4:
+            raise InputError(f"{self.vertices} vertices are too few", remedy="ask for at least 4, better for thousands")
 
-    Seeds are `holes` Euclidean farthest points. Triangles are removed in the order of their distance from the nearest
-    seed, measured along edges whose lengths are multiplied by random factors, which makes the borders irregular. A
-    triangle is passed over, until its neighbourhood has changed, where its removal would leave one of its corners with
-    two fans of triangles. Hence what is left stays connected through edges and has no pinch vertex: removing a triangle
-    could only separate neighbours that share one of its corners, and these stay in one fan about it.
+    @property
+    def name(self) -> str:
+        """Name of the data set with its size and seed."""
+        return f"recipe {self.vertices} seed {self.seed}"
 
-    Parameters
-    ----------
-    mesh
-        A pose with m faces, one piece without pinch vertices.
-    holes
-        Number of seeds: 5, 25 and 50 in the track.
-    keep
-        Fraction of the area to be left: 0.4, 0.7 and 0.9 in the track.
-    jitter
-        Spread of the random factors' logarithm.
+    def classes(self) -> Sequence[DenseClass]:
+        """Return the classes found."""
+        return dense_classes(Path(self.root), vertices=self.vertices, seed=self.seed)
 
-    Returns
-    -------
-    (m,) whether each face is kept; the area kept is `keep` up to one triangle.
-
-    Raises
-    ------
-    InputError
-        If `keep` is not between 0 and 1, or growing stops before it is reached.
-    """
-    if not 0.0 < keep < 1.0:
-        raise InputError(f"keep is {keep}, not between 0 and 1", remedy="give the fraction of the area to be left")
-    arrival = _arrival(mesh, farthest_points(mesh, holes), np.random.default_rng(seed), jitter)
-    fans = _Fans(mesh)
-    budget = (1.0 - keep) * mesh.area
-    # Each seed opens at the incident triangle that is reached first; from there a hole spreads over edges.
-    queue = [(float(arrival[face]), int(face)) for face in np.flatnonzero(arrival <= _first_arrivals(mesh, arrival))]
-    heapq.heapify(queue)
-    while budget > 0 and queue:
-        _, face = heapq.heappop(queue)
-        if fans.kept[face] and fans.may_lose(face):
-            fans.kept[face] = False
-            budget -= float(mesh.face_areas[face])
-            for neighbour in fans.neighbours(face):
-                heapq.heappush(queue, (float(arrival[neighbour]), neighbour))
-    if budget > 0:
-        raise InputError(
-            f"{holes} holes in {mesh.name} cannot grow until {keep:.0%} of the area is left", remedy="keep more of it"
-        )
-    return fans.kept
-
-
-def _arrival(mesh: Mesh, seeds: IntArray, generator: np.random.Generator, jitter: float) -> FloatArray:
-    """(m,) jittered distance of each face from the nearest seed."""
-    graph = virtual_edge_graph(mesh).tocoo()
-    low, high = np.minimum(graph.row, graph.col), np.maximum(graph.row, graph.col)
-    _, edge = np.unique(low.astype(np.int64) * len(mesh.vertices) + high, return_inverse=True)
-    factor = np.exp(jitter * generator.normal(size=int(edge.max()) + 1))[edge]
-    graph.data = graph.data * factor
-    reach = dijkstra(graph.tocsr(), directed=True, indices=seeds, min_only=True)
-    return np.asarray(reach[mesh.faces].mean(axis=1), dtype=np.float64)
-
-
-def _first_arrivals(mesh: Mesh, arrival: FloatArray) -> FloatArray:
-    """(m,) least arrival among the faces that share a vertex with each face; its minima are where holes open."""
-    least = np.full(len(mesh.vertices), np.inf)
-    np.minimum.at(least, mesh.faces.ravel(), np.repeat(arrival, 3))
-    return np.asarray(least[mesh.faces].min(axis=1), dtype=np.float64)
-
-
-class _Fans:
-    """Keep track of the triangles about each vertex while triangles are removed."""
-
-    def __init__(self, mesh: Mesh) -> None:
-        self.kept: BoolArray = np.ones(len(mesh.faces), dtype=bool)
-        self._faces: list[list[int]] = mesh.faces.tolist()
-        self._around: list[list[int]] = [[] for _ in range(len(mesh.vertices))]
-        for face, corners in enumerate(self._faces):
-            for corner in corners:
-                self._around[corner].append(face)
-
-    def neighbours(self, face: int) -> list[int]:
-        """Return the kept faces that share an edge with `face`."""
-        mine = set(self._faces[face])
-        near = {other for corner in mine for other in self._around[corner] if self.kept[other] and other != face}
-        return sorted(other for other in near if len(mine.intersection(self._faces[other])) == 2)
-
-    def may_lose(self, face: int) -> bool:
-        """Tell whether each corner of `face` keeps a single fan, or nothing, without it."""
-        return all(self._is_one_fan(corner, face) for corner in self._faces[face])
-
-    def _is_one_fan(self, vertex: int, without: int) -> bool:
-        left = [face for face in self._around[vertex] if self.kept[face] and face != without]
-        if not left:
-            return True
-        reached, todo = {left[0]}, [left[0]]
-        while todo:
-            corners = set(self._faces[todo.pop()])
-            for other in left:
-                if other not in reached and len(corners.intersection(self._faces[other])) >= 2:
-                    reached.add(other)
-                    todo.append(other)
-        return len(reached) == len(left)
+    def pairs(self) -> Sequence[PairSpec]:
+        """List six cuts and nine holed shapes of every pose, without making them."""
+        return part_pairs(self.classes(), seed=self.seed)

@@ -35,19 +35,19 @@ def nonrigid() -> Callable[..., Answer]:
 
 
 @pytest.fixture(scope="session")
-def fox() -> PairData:
-    """A cut fox of few vertices."""
+def person() -> PairData:
+    """A part of a person, of few vertices."""
     return Creatures(vertices=600).pairs()[0].load()
 
 
 @pytest.fixture(scope="session")
-def files(fox: PairData, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def files(person: PairData, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same as files, under the names that the README uses."""
-    folder = tmp_path_factory.mktemp("fox")
-    assert fox.truth is not None
-    assert fox.mirrored is not None
-    write_off(fox.part, folder / "part.off")
-    write_off(fox.full, folder / "full.off")
-    write_baryc(folder / "part.baryc_gt", fox.truth)
-    write_baryc(folder / "part.baryc_gt_sym", fox.mirrored)
+    folder = tmp_path_factory.mktemp("person")
+    assert person.truth is not None
+    assert person.mirrored is not None
+    write_off(person.part, folder / "part.off")
+    write_off(person.full, folder / "full.off")
+    write_baryc(folder / "part.baryc_gt", person.truth)
+    write_baryc(folder / "part.baryc_gt_sym", person.mirrored)
     return folder

@@ -34,8 +34,8 @@ def matched(files: Path, nonrigid: Command) -> Path:
     return out
 
 
-def test_match_writes_one_row_a_vertex(matched: Path, fox: PairData) -> None:
-    points = read_corr(matched, full=fox.full, expected_rows=len(fox.part.vertices))
+def test_match_writes_one_row_a_vertex(matched: Path, person: PairData) -> None:
+    points = read_corr(matched, full=person.full, expected_rows=len(person.part.vertices))
     assert 3 <= points.matched.sum() <= 30
 
 
@@ -59,9 +59,9 @@ def test_score_needs_the_part_for_coverage_alone(matched: Path, files: Path, non
     assert "give --part" in shown.out
 
 
-def test_the_truth_scores_zero(fox: PairData, files: Path, tmp_path: Path, nonrigid: Command) -> None:
-    assert fox.truth is not None
-    write_corr(tmp_path / "t.corr", fox.truth)
+def test_the_truth_scores_zero(person: PairData, files: Path, tmp_path: Path, nonrigid: Command) -> None:
+    assert person.truth is not None
+    write_corr(tmp_path / "t.corr", person.truth)
     answer = nonrigid(
         "score", tmp_path / "t.corr", "--full", files / "full.off", "--truth", files / "part.baryc_gt", "--json"
     )
@@ -116,15 +116,15 @@ def test_cache_is_counted_and_cleared(monkeypatch: pytest.MonkeyPatch, tmp_path:
     assert nonrigid("cache", "info").out.startswith("0 results")
 
 
-def _bad_meshes(folder: Path, fox: PairData) -> None:
+def _bad_meshes(folder: Path, person: PairData) -> None:
     text = (folder / "part.off").read_text().splitlines()
     (folder / "truncated.off").write_text("\n".join(text[: len(text) // 2]))
     (folder / "nan.off").write_text("\n".join([*text[:2], "nan 0 0", *text[3:]]))
     (folder / "index.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n")
     (folder / "empty.off").write_text("OFF\n0 0 0\n")
     (folder / "flat.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n")
-    moved = np.vstack([fox.part.vertices, fox.part.vertices + 100])
-    write_off(Mesh(moved, np.vstack([fox.part.faces, fox.part.faces + len(fox.part.vertices)])), folder / "two.off")
+    moved = np.vstack([person.part.vertices, person.part.vertices + 100])
+    write_off(Mesh(moved, np.vstack([person.part.faces, person.part.faces + len(person.part.vertices)])), folder / "two.off")
     (folder / "short.baryc_gt").write_text("1.0 1 0 0\n")
     (folder / "mesh.txt").write_text("OFF")
 
@@ -167,7 +167,7 @@ BAD = {
 def test_bad_input_gives_one_line_and_exit_code_two(
     name: str,
     files: Path,
-    fox: PairData,
+    person: PairData,
     matched: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -175,7 +175,7 @@ def test_bad_input_gives_one_line_and_exit_code_two(
 ) -> None:
     for source in [*files.glob("*.off"), *files.glob("*gt*"), matched]:
         shutil.copy(source, tmp_path)
-    _bad_meshes(tmp_path, fox)
+    _bad_meshes(tmp_path, person)
     monkeypatch.chdir(tmp_path)
     words, expected = BAD[name]
     answer = nonrigid(*words.split())

@@ -1,123 +1,18 @@
-import pickle
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from nonrigid.benchmark.datasets.anatomy import FOX, TROLL
-from nonrigid.benchmark.datasets.creatures import Creatures, posed_creature
-from nonrigid.benchmark.datasets.protocols import Dataset, PairData
-from nonrigid.benchmark.datasets.recipe import cut_by_plane, cut_planes, grow_holes
 from nonrigid.benchmark.datasets.shrec16 import Shrec16
 from nonrigid.benchmark.formats import write_baryc
-from nonrigid.geometry.clean import clean
 from nonrigid.geometry.errors import InputError, UnknownNameError
 from nonrigid.geometry.io import write_off
-from nonrigid.geometry.mesh import Mesh
-from nonrigid.geometry.partial import face_pieces, restrict
+from nonrigid.geometry.partial import restrict
 from nonrigid.geometry.points import SurfacePoints
 from nonrigid.geometry.remesh import decimate, isosurface
 
 BALL = decimate(isosurface(lambda p: np.linalg.norm(p, axis=1) - 1.0, [-1.2] * 3, [1.2] * 3, 0.08), 600)
-SMALL = Creatures(vertices=800)
-
-
-@pytest.fixture(scope="module")
-def pairs() -> list[PairData]:
-    return [spec.load() for spec in SMALL.pairs()]
-
-
-def test_creatures_are_a_dataset_that_can_be_sent_away() -> None:
-    assert isinstance(SMALL, Dataset)
-    specs = SMALL.pairs()
-    assert len({spec.name for spec in specs}) == len(specs) == 8
-    assert [spec.name for spec in pickle.loads(pickle.dumps(specs))] == [spec.name for spec in specs]
-    with pytest.raises(InputError, match="100 vertices are too few"):
-        Creatures(vertices=100)
-
-
-def test_creature_parts_are_one_clean_piece(pairs: list[PairData]) -> None:
-    for pair in pairs:
-        assert face_pieces(pair.part).max() == 0
-        assert clean(pair.part).repairs == ()
-        assert clean(pair.full).repairs == ()
-        assert abs(len(pair.full.vertices) - 800) <= 2
-        assert 0.3 < pair.kept_area < 0.8
-
-
-def test_creatures_move_nearly_isometrically(pairs: list[PairData]) -> None:
-    for pair in pairs:
-        i, j = pair.part.edges.T
-        long = np.linalg.norm(pair.part.vertices[i] - pair.part.vertices[j], axis=1)
-        for points in (pair.truth, pair.mirrored):
-            assert points is not None
-            place = points.positions(pair.full)
-            low, middle, high = np.percentile(np.linalg.norm(place[i] - place[j], axis=1) / long, [5, 50, 95])
-            assert 0.78 < low < 0.97 < middle < 1.03 < high < 1.27
-
-
-def test_remeshed_poses_share_no_triangulation(pairs: list[PairData]) -> None:
-    for pair in pairs:
-        assert pair.truth is not None
-        assert (pair.truth.barycentric.max(axis=1) > 0.999).mean() < 0.05
-
-
-def test_neutral_pose_is_mapped_to_itself_and_mirrored_twice_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(TROLL.poses[0], "chest", (0, 0, 0))
-    for bone in list(TROLL.poses[0]):
-        monkeypatch.setitem(TROLL.poses[0], bone, (0, 0, 0))
-    made = posed_creature(TROLL, 0, vertices=800)
-    full = Mesh(made["full vertices"], made["full faces"])
-    vertices = np.asarray(made["part vertices"], dtype=float)
-    unit = np.sqrt(full.area)
-    truth = SurfacePoints(made["truth faces"], made["truth weights"]).positions(full)
-    assert np.linalg.norm(truth - vertices, axis=1).max() < 0.02 * unit
-    mirrored = SurfacePoints(made["mirrored faces"], made["mirrored weights"]).positions(full)
-    assert np.linalg.norm(mirrored * [-1, 1, 1] - vertices, axis=1).max() < 0.02 * unit
-
-
-def test_creatures_are_the_same_each_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    made = []
-    for folder in ("a", "b"):
-        monkeypatch.setenv("NONRIGID_CACHE", str(tmp_path / folder))
-        made.append(posed_creature(FOX, 0, vertices=600))
-    assert made[0].keys() == made[1].keys()
-    assert all(made[0][key].tobytes() == made[1][key].tobytes() for key in made[0])
-
-
-@settings(max_examples=12, deadline=None)
-@given(st.integers(1, 20), st.floats(0.5, 0.95), st.integers(0, 1000))
-def test_holes_leave_one_piece_of_the_promised_area(holes: int, keep: float, seed: int) -> None:
-    kept = grow_holes(BALL, holes=holes, keep=keep, seed=seed)
-    part = restrict(BALL, kept)
-    assert keep - BALL.face_areas.max() / BALL.area <= part.kept_area <= keep
-    assert face_pieces(part.mesh).max() == 0
-    assert clean(part.mesh).repairs == ()
-    np.testing.assert_array_equal(kept, grow_holes(BALL, holes=holes, keep=keep, seed=seed))
-
-
-def test_impossible_holes_are_refused() -> None:
-    with pytest.raises(InputError, match=r"keep is 1.5"):
-        grow_holes(BALL, holes=3, keep=1.5, seed=0)
-    with pytest.raises(InputError, match="cannot grow"):
-        grow_holes(BALL, holes=300, keep=0.001, seed=0)
-
-
-def test_a_cut_keeps_the_side_of_the_plane_that_the_truth_says() -> None:
-    vertices = np.arange(len(BALL.vertices))
-    truth = SurfacePoints.at_vertices(BALL, vertices)
-    bent = Mesh(BALL.vertices * [1, 2, 1] + [0, 0, 7], BALL.faces)
-    for point, normal in zip(*cut_planes(BALL, 4, 1), strict=True):
-        assert np.linalg.norm(normal) == pytest.approx(1.0)
-        kept = cut_by_plane(bent, truth, BALL, point=point, normal=normal)
-        used = np.unique(bent.faces[kept])
-        assert ((BALL.vertices[used] - point) @ normal > 0).all()
-        assert 0.2 < BALL.face_areas[kept].sum() / BALL.area < 0.8
-    with pytest.raises(InputError, match="leaves nothing"):
-        cut_by_plane(bent, truth, BALL, point=np.array([9.0, 0, 0]), normal=np.array([1.0, 0, 0]))
 
 
 @pytest.fixture

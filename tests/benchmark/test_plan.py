@@ -14,7 +14,7 @@ backends = ["native", "nlopt:LD_CCSAQ+native"]
 [data]
 dataset = "creatures"
 vertices = 600
-names = ["cuts_fox_shape_1"]
+names = ["cuts_cat_shape_1"]
 [limits]
 seconds = 5
 [[methods]]
@@ -26,7 +26,7 @@ settings = { part_samples = 20, radii = [0.05, 0.1] }
 def test_a_plan_is_read_with_its_types(tmp_path: Path) -> None:
     (tmp_path / "p.toml").write_text(GOOD)
     plan = read_plan(tmp_path / "p.toml")
-    assert [spec.name for spec in plan.pairs()] == ["cuts_fox_shape_1"]
+    assert [spec.name for spec in plan.pairs()] == ["cuts_cat_shape_1"]
     assert plan.limits.seconds == 5
     assert plan.methods[0].formulation.radii == (0.05, 0.1)  # type: ignore[attr-defined]
     assert plan.text == GOOD
@@ -83,8 +83,8 @@ def test_a_wrong_plan_names_file_key_and_remedy(tmp_path: Path, old: str, new: s
 
 
 def test_an_unknown_pair_is_named(tmp_path: Path) -> None:
-    (tmp_path / "p.toml").write_text(GOOD.replace("cuts_fox_shape_1", "cuts_cat_shape_1"))
-    with pytest.raises(NonrigidError, match="unknown pair 'cuts_cat_shape_1'"):
+    (tmp_path / "p.toml").write_text(GOOD.replace("cuts_cat_shape_1", "cuts_bear_shape_1"))
+    with pytest.raises(NonrigidError, match="unknown pair 'cuts_bear_shape_1'"):
         read_plan(tmp_path / "p.toml").pairs()
 
 

@@ -34,7 +34,7 @@ backends = ["native", "native:replicator", "casadi:bonmin", "scipy:L-BFGS-B"]
 [data]
 dataset = "creatures"
 vertices = 600
-names = ["cuts_fox_shape_1", "holes_troll_shape_1"]
+names = ["cuts_cat_shape_1", "holes_cat_shape_2"]
 [limits]
 seconds = 10
 [[methods]]
