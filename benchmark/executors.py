@@ -14,6 +14,7 @@ from joblib.externals.loky.process_executor import TerminatedWorkerError
 from nonrigid.benchmark.helper import in_helper
 from nonrigid.benchmark.task import Task, WorkerLostError, do_task
 from nonrigid.geometry.errors import InputError, UnknownNameError
+from nonrigid.solvers.confine import follow_parent
 
 KINDS = ("joblib", "dask", "inprocess")
 
@@ -61,9 +62,15 @@ class Joblib:
         if self.workers == 1:
             InProcess().do(tasks)
             return
-        with parallel_config(backend="loky", n_jobs=self.workers, inner_max_num_threads=1):
+        with parallel_config(
+            backend="loky",
+            n_jobs=min(self.workers, len(tasks)),
+            inner_max_num_threads=1,
+            initializer=follow_parent,
+            initargs=(os.getpid(),),
+        ):
             try:
-                Parallel(batch_size=1, pre_dispatch="all")(delayed(_leashed)(task, os.getpid()) for task in tasks)
+                Parallel(batch_size=1, pre_dispatch="all")(delayed(do_task)(task) for task in tasks)
             except TerminatedWorkerError:
                 raise WorkerLostError("a worker process was killed, perhaps for want of memory") from None
 
@@ -145,10 +152,6 @@ def make_executor(kind: str, *, workers: int = 1, scheduler: str | None = None) 
             raise InputError(f"--jobs is {workers}, but inprocess is one process", remedy="use --executor joblib")
         return InProcess()
     return Joblib(workers=workers) if kind == "joblib" else Dask(scheduler=scheduler, workers=workers)
-
-
-def _leashed(task: Task, parent: int) -> None:
-    do_task(task, leash=parent)
 
 
 def _distributed() -> Any:

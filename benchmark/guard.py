@@ -24,7 +24,7 @@ from nonrigid.solvers.confine import (
 Tell = Callable[[str], None]
 
 _GRACE = 10.0  # seconds that a child may take to end once it has closed its pipe; a crash writes its core then
-_LOOK_EVERY = 0.2  # seconds between looks at whether the caller's own parent still lives
+_LOOK_EVERY = 0.2  # seconds between looks at whether a silent child still lives
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +55,6 @@ def guarded_call(
     seconds: float | None = None,
     memory_gb: float | None = None,
     log: Path | None = None,
-    leash: int | None = None,
     until: str | None = None,
 ) -> Ended:
     """Call `work` in a child process and say how it ended; what it returns is lost, so it has to write its results.
@@ -71,8 +70,6 @@ def guarded_call(
         Memory that the child may take beyond what this process holds; see `nonrigid.solvers.confine.limit_memory`.
     log
         File for everything that the child and the libraries in it print; by default they print where this process does.
-    leash
-        Process id of this process's parent: where that dies, child and this process end at once.
     until
         Once the child tells this word, the bound on its time is lifted.
 
@@ -111,9 +108,6 @@ def guarded_call(
                 else:
                     told = text
                     deadline = None if seconds is None or told == until else time.monotonic() + seconds
-            elif leash is not None and os.getppid() != leash:
-                _kill(child)
-                os._exit(1)
             elif child.exitcode is not None:
                 break  # a grandchild may hold the pipe open
         if not killed:

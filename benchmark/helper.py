@@ -14,6 +14,7 @@ import threading
 from typing import Any
 
 from nonrigid.benchmark.task import Task, do_task
+from nonrigid.solvers.confine import follow_parent
 
 _here = threading.local()
 
@@ -29,7 +30,7 @@ def in_helper(task: Task) -> None:
     assert helper.stdin is not None
     assert helper.stdout is not None
     try:
-        pickle.dump((task, os.getpid()), helper.stdin)
+        pickle.dump(task, helper.stdin)
         helper.stdin.flush()
         failure = pickle.load(helper.stdout)
     except (OSError, EOFError, pickle.UnpicklingError):
@@ -48,17 +49,18 @@ def _started() -> subprocess.Popen[bytes]:
 
 
 def _serve() -> None:
+    follow_parent(os.getppid())
     # What a library prints must not get between the answers.
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     while True:
         try:
-            task, parent = pickle.load(sys.stdin.buffer)
+            task = pickle.load(sys.stdin.buffer)
         except (EOFError, KeyboardInterrupt):
             return
         failure: Any = None
         try:
-            do_task(task, leash=parent)
+            do_task(task)
         except Exception as error:
             failure = error
         try:

@@ -25,10 +25,11 @@ from nonrigid.formulations.model import Problem
 from nonrigid.geometry.cache import content_hash
 from nonrigid.geometry.errors import NonrigidError
 from nonrigid.solvers.backend import backend_class
-from nonrigid.solvers.confine import peak_memory
+from nonrigid.solvers.confine import is_out_of_memory, peak_memory
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.match import match
 from nonrigid.solvers.solution import Solution
+from nonrigid.solvers.status import Status
 
 TRACE_POINTS = 100
 """Points of a solver's trace that are kept, evenly chosen."""
@@ -120,19 +121,24 @@ def do_run(run: Run, data: PairData, pair: Pair, store: Store) -> Record:
         raise
     except Exception as failure:
         # A method or library of a third party may raise anything; the row says so, and the benchmark goes on.
-        record |= _failed(failure)
+        record |= _failed(failure, run.limits)
     record |= {"total_seconds": perf_counter() - begun, "peak_memory": peak_memory()}
     return _write(record, store)
 
 
 def write_failure(run: Run, failure: Exception, store: Store) -> Record:
     """Write the record of a run that could not even start."""
-    return _write(_head(run) | _failed(failure), store)
+    return _write(_head(run) | _failed(failure, run.limits), store)
 
 
 def write_loss(run: Run, status: str, message: str, store: Store) -> Record:
     """Write the record of a run whose process was lost: killed at its limit, or ended by a crash."""
     return _write(_head(run) | {"status": status, "message": message}, store)
+
+
+def memory_words(words: str, limits: Limits) -> str:
+    """Return the message of a run that filled its memory, given what was said then."""
+    return f"{limits.memory_gb:g} GB of memory are spent ({' '.join(words.split())})"
 
 
 @dataclass
@@ -164,8 +170,10 @@ def problem_hash(problem: Problem) -> str | None:
     return str(digest)
 
 
-def _failed(failure: Exception) -> Record:
+def _failed(failure: Exception, limits: Limits) -> Record:
     words = str(failure) if isinstance(failure, NonrigidError) else f"{type(failure).__name__}: {failure}"
+    if limits.memory_gb is not None and is_out_of_memory(words):
+        return {"status": Status.LIMIT.value, "message": memory_words(words, limits)}
     return {"status": "error", "message": " ".join(words.split())}
 
 

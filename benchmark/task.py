@@ -15,7 +15,7 @@ from nonrigid.benchmark.datasets.protocols import PairData, PairSpec
 from nonrigid.benchmark.environment import known_environment
 from nonrigid.benchmark.guard import Ended, guarded_call
 from nonrigid.benchmark.protocol import random_rigid_motion
-from nonrigid.benchmark.run import Run, do_run, write_failure, write_loss
+from nonrigid.benchmark.run import Run, do_run, memory_words, write_failure, write_loss
 from nonrigid.benchmark.store import StorageError, Store
 from nonrigid.formulations.formulation import Formulation, Pair
 from nonrigid.geometry.cache import content_hash
@@ -40,7 +40,7 @@ class Task:
     folder: Path
 
 
-def do_task(task: Task, *, leash: int | None = None) -> None:
+def do_task(task: Task) -> None:
     """Do the runs of one pair that are not finished.
 
     Everything happens in a child process that loads the pair and derives the geometry that its runs share, so that
@@ -64,10 +64,9 @@ def do_task(task: Task, *, leash: int | None = None) -> None:
     while todo := tuple(run for run in task.runs if not store.has(run.id)):
         first = todo[0]
         ended = guarded_call(
-            partial(_host, Task(task.spec, todo, task.folder), tuple(cold), leash),
+            partial(_host, Task(task.spec, todo, task.folder), tuple(cold)),
             seconds=first.run_seconds,
             memory_gb=first.limits.memory_gb,
-            leash=leash,
             until=_READY,
         )
         if ended.well:
@@ -90,7 +89,7 @@ def data_hash(data: PairData) -> str:
     return content_hash(*arrays)
 
 
-def _host(task: Task, cold: tuple[str, ...], leash: int | None, tell: Callable[[str], None]) -> None:
+def _host(task: Task, cold: tuple[str, ...], tell: Callable[[str], None]) -> None:
     store = Store(task.folder)
     with threadpool_limits(1):
         try:
@@ -148,7 +147,7 @@ def _verdict(ended: Ended, run: Run) -> tuple[str, str]:
     if ended.killed:
         return Status.LIMIT.value, f"{ended.words}; {Status.LIMIT.advice.partition(';')[0]}"
     if is_out_of_memory(ended.words) and run.limits.memory_gb is not None:
-        return Status.LIMIT.value, f"{run.limits.memory_gb:g} GB of memory are spent ({ended.words})"
+        return Status.LIMIT.value, memory_words(ended.words, run.limits)
     return Status.BACKEND_ERROR.value, f"{ended.words}; {Status.BACKEND_ERROR.advice.partition(';')[0]}"
 
 

@@ -41,6 +41,23 @@ def die_with_parent(parent: int) -> None:
             os._exit(1)
 
 
+def follow_parent(parent: int) -> None:
+    """End this process within a second after its parent is dead, for workers that wait for work from it.
+
+    Unlike `die_with_parent` this looks, by the interval timer and its signal: a thread would be in the way of forking,
+    and the kernel's own signal comes already when the thread that made this process ends.
+    """
+    if not hasattr(signal, "setitimer"):
+        return
+
+    def look(*_: object) -> None:
+        if os.getppid() != parent:
+            os._exit(1)
+
+    signal.signal(signal.SIGALRM, look)
+    signal.setitimer(signal.ITIMER_REAL, 1.0, 1.0)
+
+
 def limit_memory(gigabytes: float) -> None:
     """Let this process, and each child it makes, have at most so much more memory than it has now.
 

@@ -66,8 +66,8 @@ def _show_estimate(plan: Plan, found: Estimate, jobs: int, json: bool) -> None:
     show_table(found.rows, title=plan.title, columns={key: key for key in found.rows[0]} | {"seconds": "seconds a run"})
     left, who = found.runs - found.finished, "1 process" if jobs == 1 else f"{jobs} processes"
     say(
-        f"{found.runs} runs, {found.finished} finished; the other {left} take about {found.hours:.2g} h with {who}, and "
-        f"{found.gigabytes:.2g} GB of disk; derived geometry is cached elsewhere (`nonrigid cache info`)"
+        f"{found.runs} runs, {found.finished} finished; the other {left} take about {found.hours:.2g} h with {who} "
+        f"and {found.gigabytes:.2g} GB of disk; derived geometry is cached elsewhere (`nonrigid cache info`)"
     )
 
 
