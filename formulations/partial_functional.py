@@ -34,6 +34,7 @@ from nonrigid.geometry.spectrum import Spectrum
 
 Start = Literal["several", "mask", "descriptors", "anchors"]
 _STARTS = ("several", "mask", "descriptors", "anchors")
+_ENOUGH = 2e-3  # share of its energy by which a step in C has to lie below the one before it for another round
 _TRIAL = 2  # rounds after which starts are compared: one region found for each
 
 
@@ -49,7 +50,8 @@ class PartialFunctionalMap:
     A and B the coefficients of descriptors, W 0 along a slanted diagonal, d one for as many columns as the part has
     eigenfunctions with a counterpart. C and v are found by turns; between them C is made orthonormal by closest
     points. The alternation ends, one round back, when a step in C ends no lower than the one before it did, the terms
-    in v alone not counted. Then it runs again on functions of the distances to landmarks that the first run matched.
+    in v alone not counted; and when it ends lower by less than 0.2 %. Then it runs again on functions of the distances
+    to landmarks that the first run matched.
 
     Parameters
     ----------
@@ -119,12 +121,13 @@ class PartialFunctionalMap:
             descriptors = describe(pair.part, self.radii), describe(pair.full, self.radii)
         joint = self.joint(pair, bases, descriptors)
         starts = self._starts(pair, bases)
+        trial = min(_TRIAL, self.rounds) if len(starts) > 1 else self.rounds
         tried = []
         for start in starts:
-            tried.append((yield from self._alternate(joint, bases, start, _TRIAL if len(starts) > 1 else self.rounds)))
+            tried.append((yield from self._alternate(joint, bases, start, trial)))
         kept = min(tried, key=lambda state: state.energy)
         if len(starts) > 1 and not kept.ended:
-            kept = yield from self._alternate(joint, bases, kept, self.rounds - _TRIAL)
+            kept = yield from self._alternate(joint, bases, kept, self.rounds - trial)
         if self.landmarks:
             chosen = pair.part.samples(min(self.landmarks, len(pair.part.mesh.vertices)))
             found = bases.matched(kept.C, chosen)
@@ -192,7 +195,11 @@ class PartialFunctionalMap:
             if solved.objective >= state.energy:
                 return replace(state, ended=True)
             C = bases.orthonormal(solved["C"], self.closest_point_iterations)
-            state = _State(C=C, v=v, energy=solved.objective if state.mapped else np.inf, mapped=True)
+            settled = solved.objective >= (1.0 - _ENOUGH) * state.energy
+            energy = solved.objective if state.mapped else np.inf
+            state = _State(C=C, v=v, energy=energy, mapped=True, ended=settled)
+            if settled:
+                break
         return state
 
     def _near(self, pair: Pair, part: IntArray, full: IntArray) -> tuple[FloatArray, FloatArray]:

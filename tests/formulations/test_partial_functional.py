@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,7 +15,13 @@ from nonrigid.benchmark.datasets.shrec16 import Shrec16
 from nonrigid.benchmark.protocol import random_rigid_motion, score
 from nonrigid.formulations.candidates import describe
 from nonrigid.formulations.formulation import Pair
-from nonrigid.formulations.functional_maps import estimated_rank, slanted_mask, spectral_closest_points
+from nonrigid.formulations.functional_maps import (
+    estimated_rank,
+    orthonormal_map,
+    region_of_matches,
+    slanted_mask,
+    spectral_closest_points,
+)
 from nonrigid.formulations.model import ModelError
 from nonrigid.formulations.model.terms.area_gap import AreaGap
 from nonrigid.formulations.model.terms.gram_penalty import GramPenalty
@@ -22,7 +29,7 @@ from nonrigid.formulations.model.terms.group_norm import GroupNorm21
 from nonrigid.formulations.model.terms.masked_data import MaskedBasis, MaskedData, MaskedTarget
 from nonrigid.formulations.model.terms.mumford_shah import MumfordShah
 from nonrigid.formulations.model.terms.weighted_squares import WeightedSquares
-from nonrigid.formulations.partial_functional import Bases, PartialFunctionalMap
+from nonrigid.formulations.partial_functional import Bases, PartialFunctionalMap, Start
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.geometry.errors import InputError, UnknownNameError
 from nonrigid.geometry.mesh import Mesh
@@ -34,7 +41,9 @@ from nonrigid.solvers.testing import check_term
 SMALL = PartialFunctionalMap(
     eigenfunctions=20,
     radii=(0.15,),
-    rounds=2,
+    start_radii=(0.15,),
+    start_samples=200,
+    rounds=3,
     landmarks=15,
     closest_point_samples=150,
     map_evaluations=100,
@@ -184,10 +193,55 @@ def test_a_cut_tube_is_found_again(backend: str | dict[str, str]) -> None:
     assert np.median(apart) / np.sqrt(whole.area) < 0.06
 
 
+@pytest.mark.parametrize("start", ["mask", "descriptors", "anchors"])
+def test_each_start_states_the_published_sequence_of_steps(pair: Pair, start: Start) -> None:
+    found = match(pair, replace(SMALL, start=start, landmarks=0, map_evaluations=20, region_evaluations=10))
+    steps = [solution.problem for solution in found.solutions if solution.problem in ("C", "v")]
+    assert steps[0] == "C"
+    assert all(one != other for one, other in pairwise(steps))
+    assert len(steps) <= 2 * SMALL.rounds - 1
+    assert found.correspondence is not None
+
+
+def test_the_start_whose_step_in_c_ends_lowest_goes_on(pair: Pair) -> None:
+    settings = replace(SMALL, landmarks=0, map_evaluations=60)
+    trials = {
+        start: match(pair, replace(settings, start=start, rounds=2)).solutions[2].objective
+        for start in ("mask", "descriptors")
+    }
+    steps = match(pair, settings).solutions
+    energies = [solution.objective for solution in steps if solution.problem == "C"]
+    assert [energies[1], energies[3]] == pytest.approx([trials["mask"], trials["descriptors"]], rel=1e-9)
+    assert len(steps) in (6, 8)  # two starts of C v C, and at most one more round of the better one: v C
+    both = PartialFunctionalMap(start_radii=())
+    with pytest.raises(InputError, match="start_radii is empty"):
+        match(pair, both)
+
+
+@settings(max_examples=20, deadline=None)
+@given(st.integers(0, 10**6))
+def test_a_map_of_matches_forgets_the_wrong_third(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    planted = np.linalg.qr(rng.standard_normal((6, 4)))[0]
+    part = rng.standard_normal((90, 4))
+    full = part @ planted.T
+    full[:30] = full[rng.permutation(90)[:30]]
+    found = orthonormal_map(part, full)
+    assert np.allclose(found.T @ found, np.eye(4), atol=1e-12)
+    assert np.linalg.norm(found - planted) < 0.1
+
+
+def test_the_region_of_matches_has_the_area_and_the_place_of_the_matches(pair: Pair) -> None:
+    full, low = pair.full.spectrum(40), pair.full.mesh.vertices[:, 2] < np.median(pair.full.mesh.vertices[:, 2])
+    region = region_of_matches(np.flatnonzero(low), full.mass[low], full, float(full.mass[low].sum()))
+    assert full.mass @ region == pytest.approx(full.mass[low].sum(), abs=2 * full.mass.max())
+    assert full.mass @ (region * low) > 0.85 * full.mass[low].sum()
+
+
 def test_scale_changes_nothing() -> None:
     whole = bumpy(24, 14)
     part, _ = cut(whole, 2.7)
-    settings = PartialFunctionalMap(eigenfunctions=8, radii=(0.3,), rounds=2, landmarks=0)
+    settings = PartialFunctionalMap(eigenfunctions=8, radii=(0.3,), start_radii=(0.3,), rounds=1, landmarks=0)
     answers = [
         match(Pair.of(part.transformed(scale=f), whole.transformed(scale=f), cache=None), settings) for f in (1.0, 64.0)
     ]
@@ -205,9 +259,13 @@ def test_wrong_settings_are_refused_in_words(pair: Pair) -> None:
 @pytest.mark.realdata
 def test_a_real_cut_is_matched(data: Path) -> None:
     loaded = next(iter(Shrec16(root=data, names=("cuts_wolf_shape_7",)).pairs())).load()
-    part, _, _ = random_rigid_motion(loaded.part, 0)
-    settings = PartialFunctionalMap(eigenfunctions=30, rounds=2, landmarks=20, region_evaluations=30)
-    found = match(Pair.of(part, loaded.full), settings)
-    assert found.correspondence is not None
-    assert len(found.correspondence) == len(loaded.part.vertices)
-    assert score(loaded, found.correspondence.dense(len(loaded.part.vertices))).mean_error < 0.05
+    settings = PartialFunctionalMap(eigenfunctions=30, rounds=3, landmarks=20, region_evaluations=30)
+    errors = []
+    for seed, scale in ((0, 1.0), (1, 3.7)):
+        moved, _, _ = random_rigid_motion(loaded.part, seed)
+        found = match(Pair.of(moved.transformed(scale=scale), loaded.full.transformed(scale=scale)), settings)
+        assert found.correspondence is not None
+        assert len(found.correspondence) == len(loaded.part.vertices)
+        errors.append(score(loaded, found.correspondence.dense(len(loaded.part.vertices))).mean_error)
+    assert errors[0] < 0.05
+    assert errors[1] == pytest.approx(errors[0], rel=0.05)
