@@ -43,7 +43,8 @@ class RandomForest:
     forest
         A forest, its file, or a folder of forests in which exactly one was trained for the full surface.
     digest
-        Hash that the file must have; any where empty. `held_out` fills it in.
+        Hash that the file must have, so that results name the forest they came from; any where empty. `held_out`
+        fills it in.
     eigenfunctions
         k of the full surface; a surface with fewer vertices gives fewer.
     slanted
@@ -154,10 +155,8 @@ class RandomForest:
         if isinstance(self.forest, Forest):
             return self.forest, self.forest.template.label_vertices(pair.full)
         files = self._files()
-        for file in files:
-            found = forest_digest(file)
-            if self.digest and found != self.digest:
-                raise InputError(f"the forest has the hash {found}, not {self.digest}", file=file, remedy=_TRAIN)
+        if self.digest and (found := forest_digest(files[0])) != self.digest:
+            raise InputError(f"the forest has the hash {found}, not {self.digest}", file=files[0], remedy=_TRAIN)
         if len(files) == 1:
             forest = load_forest(files[0])
             return forest, forest.template.label_vertices(pair.full)
