@@ -6,11 +6,13 @@ import hashlib
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-from nonrigid.benchmark.datasets.protocols import PairData, PairSpec
+from nonrigid.benchmark.datasets.files import load_mesh
+from nonrigid.benchmark.datasets.protocols import MeshSource, PairData, PairSpec
 from nonrigid.benchmark.formats import read_corr, write_text
 from nonrigid.benchmark.matched_points import MatchedPoints, matched_points, read_points
 from nonrigid.benchmark.protocol import score
@@ -51,6 +53,10 @@ _STAGE = (
 )
 
 
+TRACE_POINTS = 50
+"""Points of a trace that a page shows; the tables of the results hold all that were kept."""
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PairTask:
     """Hold what a pair's page is made of; `spec` is None where the data set cannot be read, and `problem` says why."""
@@ -80,7 +86,7 @@ def write_pair(task: PairTask) -> None:
     problem = task.problem
     if task.spec is not None:
         try:
-            data = task.spec.load()
+            data = replace(task.spec, full=partial(_shared, task.spec.full)).load()
         except NonrigidError as failure:
             problem = str(failure)
     out = task.folder / "report"
@@ -139,8 +145,7 @@ def _run(record: Record, store: Store, data: PairData | None, blocks: dict[str, 
     if store.log_file(record["id"]).is_file():
         run["log"] = f"../../{store.log_file(record['id']).relative_to(store.folder).as_posix()}"
     run["stages"] = [
-        {**{key: stage.get(key) for key in _STAGE}, "trace": [_short(point) for point in stage["trace"]]}
-        for stage in record["stages"]
+        {**{key: stage.get(key) for key in _STAGE}, "trace": _thinned(stage["trace"])} for stage in record["stages"]
     ]
     found = None if data is None else _matches(record, store, data)
     if found is not None:
@@ -166,10 +171,16 @@ def _matches(record: Record, store: Store, data: PairData) -> MatchedPoints | No
     return matched_points(points, errors)
 
 
-def _short(point: Sequence[float | None]) -> list[float | None]:
-    # The objective keeps what a plot of small distances to the best one needs.
-    digits = (4, 6, 12, 3)
-    return [None if v is None else float(f"{v:.{d}g}") for v, d in zip(point, digits, strict=True)]
+def _thinned(trace: Sequence[Sequence[float | None]]) -> list[Sequence[float | None]]:
+    """Return seconds, evaluations and objectives of at most `TRACE_POINTS` points: a plot shows no more."""
+    step = max(1, -(-len(trace) // TRACE_POINTS))
+    return [point[:3] for point in trace[::step]]
+
+
+@lru_cache(maxsize=2)
+def _shared(source: MeshSource) -> Mesh:
+    """Read a full surface; many pairs in a row have the same."""
+    return source() if callable(source) else load_mesh(source)
 
 
 def _facts(record: Mapping[str, Any], data: PairData | None) -> list[str]:

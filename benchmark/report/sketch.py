@@ -11,11 +11,13 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from nonrigid.benchmark.formats import write_text
 from nonrigid.benchmark.report.export import Row, write_table
 from nonrigid.benchmark.report.series import Series
 
-FAINT = {"light": "#d8dce1", "dark": "#3a4048"}
-INK = {"light": "#1f2328", "dark": "#e6e8eb"}
+INK, FAINT = "#1f2328", "#d8dce1"
+"""Colours of text and axes, and of grids, on a light page."""
+_DARK = {INK: "#e6e8eb", FAINT: "#3a4048"}
 _STYLE: dict[Any, Any] = {
     "font.family": "sans-serif",
     "font.size": 10,
@@ -46,7 +48,7 @@ class Sketch:
     rows
         What is drawn, as a table.
     draw
-        Draws into a figure for the theme "light" or "dark".
+        Draws into a figure.
     size
         Width and height in inches.
     """
@@ -55,20 +57,26 @@ class Sketch:
     title: str
     caption: str
     rows: Sequence[Row]
-    draw: Callable[[Figure, str], None]
+    draw: Callable[[Figure], None]
     size: tuple[float, float] = (7.6, 4.2)
 
 
 def save_sketch(out: Path, sketch: Sketch) -> None:
     """Write `<name>-light.svg`, `<name>-dark.svg`, `<name>.png`, `<name>.pdf`, `<name>.csv` and `<name>.tex`."""
-    for theme in ("light", "dark"):
-        with mpl.rc_context({**_STYLE, **dict.fromkeys(_INKED, INK[theme])}):
-            figure = Figure(figsize=sketch.size, layout="constrained")
-            sketch.draw(figure, theme)
-            figure.savefig(out / f"{sketch.name}-{theme}.svg", transparent=True, metadata={"Date": None})
-            if theme == "light":
-                figure.savefig(out / f"{sketch.name}.png", dpi=200, facecolor="white")
-                figure.savefig(out / f"{sketch.name}.pdf", metadata={"CreationDate": None})
+    with mpl.rc_context({**_STYLE, **dict.fromkeys(_INKED, INK)}):
+        figure = Figure(figsize=sketch.size, layout="constrained")
+        sketch.draw(figure)
+        # One layout serves all forms; it is what takes longest.
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
+        light = out / f"{sketch.name}-light.svg"
+        figure.savefig(light, transparent=True, metadata={"Date": None})
+        figure.savefig(out / f"{sketch.name}.png", dpi=200, facecolor="white")
+        figure.savefig(out / f"{sketch.name}.pdf", metadata={"CreationDate": None})
+    drawn = light.read_text(encoding="utf-8")
+    for bright, dark in _DARK.items():
+        drawn = drawn.replace(bright, dark)
+    write_text(out / f"{sketch.name}-dark.svg", drawn)
     write_table(out / sketch.name, sketch.rows)
 
 
@@ -88,12 +96,12 @@ def legend(figure: Figure, handles: Iterable[Any] | None = None) -> None:
     )
 
 
-def keys(shown: Sequence[Series], theme: str) -> list[Line2D]:
+def keys(shown: Sequence[Series]) -> list[Line2D]:
     """Return legend entries: a colour a method and a marker a backend, or one entry a backend for one method."""
     methods = {one.label: one.colour for one in shown}
     backends = {one.backend: one.marker for one in shown}
     if len(methods) == 1:
         return [Line2D([], [], color=one.colour, marker=one.marker, ls="", label=one.name) for one in shown]
     return [Line2D([], [], color=colour, lw=4, label=method) for method, colour in methods.items()] + [
-        Line2D([], [], color=INK[theme], marker=marker, ls="", label=backend) for backend, marker in backends.items()
+        Line2D([], [], color=INK, marker=marker, ls="", label=backend) for backend, marker in backends.items()
     ]

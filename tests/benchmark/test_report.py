@@ -47,8 +47,9 @@ def made_up(pair: str, label: str, backend: str, objective: float, seconds: floa
         "attempts": [], "trace": [[0.0, 1.0, 0.0, 0.0], [seconds / 2, 5.0, objective / best * 2, 0.0]],
     }  # fmt: skip
     record = {
-        "id": f"{zlib.crc32(repr((pair, label, backend)).encode()):x}", "pair": pair,
-        "split": "holes" if pair.startswith("holes") else "cuts", "class_name": "anton", "label": label, "method": label, "settings": "", "backend": backend, "metric": "dijkstra", "motion_seed": 0,
+        "id": f"{zlib.crc32(repr((pair, label, backend)).encode()):x}", "pair": pair, "class_name": "anton",
+        "split": "holes" if pair.startswith("holes") else "cuts", "label": label,
+        "method": label, "settings": "", "backend": backend, "metric": "dijkstra", "motion_seed": 0,
         "status": "stationary", "message": "fine", "solver": backend, "variables": 9, "objective": objective,
         "stationarity": 1e-8, "build_seconds": 0.0, "solve_seconds": seconds, "formulation_seconds": 0.1,
         "source": "x", "stages": [stage],

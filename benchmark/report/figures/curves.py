@@ -29,7 +29,7 @@ def error_curves(series: Sequence[Series]) -> list[Sketch]:
                 means[one.name, split] = summarize(scores)
     metric = next(iter(means.values())).metric
 
-    def draw(figure: Figure, theme: str) -> None:
+    def draw(figure: Figure) -> None:
         panels = figure.subplots(1, len(splits), sharey=True, squeeze=False)[0]
         for axes, split in zip(panels, splits, strict=True):
             for one in shown:
@@ -48,7 +48,7 @@ def error_curves(series: Sequence[Series]) -> list[Sketch]:
                         linewidth=1.8,
                     )
             axes.set(xlim=(0, 0.25), ylim=(0, 102), xlabel="geodesic error / sqrt(full area)", title=split)
-            axes.grid(color=FAINT[theme], linewidth=0.6)
+            axes.grid(color=FAINT, linewidth=0.6)
         panels[0].set_ylabel("% of matches")
         legend(figure)
 

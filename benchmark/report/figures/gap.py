@@ -31,7 +31,7 @@ def gap_against_error(series: Sequence[Series]) -> list[Sketch]:
     if not any(row["gap"] > _SMALLEST_GAP for row in rows):
         return []
 
-    def draw(figure: Figure, theme: str) -> None:
+    def draw(figure: Figure) -> None:
         axes = figure.add_subplot()
         looks = {}
         for one in series:
@@ -49,8 +49,8 @@ def gap_against_error(series: Sequence[Series]) -> list[Sketch]:
                 )
         axes.set(xscale="log", xlabel="relative gap to the best objective known", ylabel="mean geodesic error x100")
         axes.set_ylim(bottom=0)
-        axes.grid(color=FAINT[theme], linewidth=0.6)
-        legend(figure, keys(list(looks.values()), theme))
+        axes.grid(color=FAINT, linewidth=0.6)
+        legend(figure, keys(list(looks.values())))
 
     said = []
     for label in dict.fromkeys(row["method"] for row in rows):

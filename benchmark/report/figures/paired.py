@@ -44,17 +44,17 @@ def paired_differences(series: Sequence[Series]) -> list[Sketch]:
             }
         )
 
-    def draw(figure: Figure, theme: str) -> None:
+    def draw(figure: Figure) -> None:
         axes = figure.add_subplot()
         for place, (one, row) in enumerate(zip(others, rows, strict=True)):
             if row["pairs"]:
                 axes.plot([row["low"], row["high"]], [place, place], color=one.colour, linewidth=2)
                 axes.plot(row["difference x100"], place, color=one.colour, marker=one.marker, markersize=7)
-        axes.axvline(0, color=INK[theme], linewidth=0.8)
+        axes.axvline(0, color=INK, linewidth=0.8)
         axes.set_yticks(range(len(others)), [str(row["series"]) for row in rows])
         axes.invert_yaxis()
         axes.set(xlabel=f"error x100 less that of {best.name}")
-        axes.grid(color=FAINT[theme], linewidth=0.6, axis="x")
+        axes.grid(color=FAINT, linewidth=0.6, axis="x")
 
     sure = sum(row["low"] > 0 for row in rows)
     caption = (

@@ -45,7 +45,7 @@ def error_by_missing_area(series: Sequence[Series]) -> list[Sketch]:
     # The panels share one axis, whose limit must not depend on which of them is drawn last.
     highest = max([row["mean error x100"] for row in rows if row["shapes"]], default=1.0) or 1.0
 
-    def draw(figure: Figure, theme: str) -> None:
+    def draw(figure: Figure) -> None:
         panels = figure.subplots(2, len(splits), sharex=True, sharey=True, squeeze=False)
         for line, bins in zip(panels, _BINS, strict=True):
             for axes, split in zip(line, splits, strict=True):
@@ -63,7 +63,7 @@ def error_by_missing_area(series: Sequence[Series]) -> list[Sketch]:
                     )
                 axes.set(xlabel=f"{_BINS[bins]} (%)", title=split if bins == "disjoint" else None)
                 axes.set_ylim(0, 1.05 * highest)
-                axes.grid(color=FAINT[theme], linewidth=0.6)
+                axes.grid(color=FAINT, linewidth=0.6)
             line[0].set_ylabel("mean error x100")
         legend(figure)
 

@@ -68,7 +68,7 @@ def _sketch(name: str, title: str, axis: str, caption: str, profile: Profile) ->
     starts = [steps[0] for steps in profile.at if len(steps)]
     low, high = min(starts, default=1.0), 1.1 * max(ends, default=1.0) + 0.1
 
-    def draw(figure: Figure, theme: str) -> None:
+    def draw(figure: Figure) -> None:
         axes = figure.add_subplot()
         for index, (solver, steps) in enumerate(zip(profile.solvers, profile.at, strict=True)):
             at = np.concatenate([[low], steps, [high]])
@@ -84,7 +84,7 @@ def _sketch(name: str, title: str, axis: str, caption: str, profile: Profile) ->
                 markersize=4,
             )
         axes.set(xscale="log", xlim=(low, high), ylim=(0, 102), xlabel=axis, ylabel="% of problems")
-        axes.grid(color=FAINT[theme], linewidth=0.6)
+        axes.grid(color=FAINT, linewidth=0.6)
         legend(figure)
 
     rows = [

@@ -32,10 +32,10 @@ def error_against_time(series: Sequence[Series]) -> list[Sketch]:
     for row, best in zip(rows, front, strict=True):
         row["on the front"] = "yes" if best else "no"
 
-    def draw(figure: Figure, theme: str) -> None:
+    def draw(figure: Figure) -> None:
         axes = figure.add_subplot()
         order = np.flatnonzero(front)[np.argsort(points[front, 0])]
-        axes.step(points[order, 0], points[order, 1], where="post", color=INK[theme], linewidth=0.8, alpha=0.6)
+        axes.step(points[order, 0], points[order, 1], where="post", color=INK, linewidth=0.8, alpha=0.6)
         for one, row, (x, y) in zip(shown, rows, points, strict=True):
             # The mean of skewed values can lie outside the quartiles; that side then has no bar.
             spans = [
@@ -47,8 +47,8 @@ def error_against_time(series: Sequence[Series]) -> list[Sketch]:
             )
         axes.set(xscale="log", xlabel="mean solve time of a pair (s)", ylabel="mean geodesic error x100")
         axes.set_ylim(bottom=0)
-        axes.grid(color=FAINT[theme], linewidth=0.6)
-        legend(figure, keys(shown, theme))
+        axes.grid(color=FAINT, linewidth=0.6)
+        legend(figure, keys(shown))
 
     names = ", ".join(one.name for one, best in zip(shown, front, strict=True) if best)
     caption = (
