@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from nonrigid.benchmark.contact_sheet import contact_sheet
 from nonrigid.benchmark.datasets.archive import Archive, open_dataset
 from nonrigid.benchmark.datasets.checks import Finding, check_archive
 from nonrigid.benchmark.datasets.convert import LAYOUTS, convert, pack
@@ -21,6 +22,7 @@ from nonrigid.benchmark.datasets.inventory import full_shape_rows, part_rows, su
 from nonrigid.benchmark.formats import write_baryc, write_vts
 from nonrigid.benchmark.plan import read_plan
 from nonrigid.benchmark.protocol import random_rigid_motion
+from nonrigid.benchmark.render import View
 from nonrigid.geometry.errors import InputError, UnknownNameError
 from nonrigid.geometry.io import write_off
 from nonrigid.geometry.mesh import Mesh
@@ -371,6 +373,19 @@ def test_commands_look_check_convert_and_draw(copy: Path, tmp_path: Path, nonrig
     assert nonrigid("data", "convert", copy, tmp_path / "c").code == 2
 
 
+def test_a_contact_sheet_shows_every_class(training: Path) -> None:
+    dataset = open_dataset(training)
+    image, shown = contact_sheet(dataset, size=40, per_class=1, view=View(azimuth=0, elevation=0))
+    assert shown == 8
+    assert image.shape == (4 * 56, 80, 4)
+    assert (image[:40, :40, :3] < 200).any()
+    assert contact_sheet(dataset, splits=("cuts",), size=40)[1] == 8
+    with pytest.raises(UnknownNameError, match="cracks"):
+        contact_sheet(dataset, splits=("cracks",))
+    with pytest.raises(InputError, match="at least 32 pixels"):
+        contact_sheet(dataset, size=4)
+
+
 def test_a_test_set_is_matched_and_submitted(
     training: Path, test_set: Path, tmp_path: Path, nonrigid: Callable[..., Any]
 ) -> None:
@@ -393,18 +408,14 @@ def test_a_test_set_is_matched_and_submitted(
 
 @pytest.mark.realdata
 def test_real_sets_are_counted_as_described(data: Path) -> None:
-    rows = {str(row["class"]): row for row in full_shape_rows(open_dataset(data / "shrec16"))}
-    keys = ("vertices", "faces", "boundary_edges", "nonmanifold_edges", "euler")
-    assert {name: tuple(row[key] for key in keys) for name, row in rows.items()} == {
-        "cat": (10000, 19940, 60, 12, 12),
-        "centaur": (10000, 19996, 0, 0, 2),
-        "david": (10000, 19950, 52, 0, -1),
-        "dog": (10000, 19950, 50, 0, 0),
-        "horse": (10000, 19996, 0, 0, 2),
-        "michael": (10000, 19955, 47, 0, -1),
-        "victoria": (10000, 19934, 68, 0, -1),
-        "wolf": (4344, 8684, 0, 0, 2),
-    }
+    names = ("cuts_cat_shape_1", "cuts_david_shape_1", "cuts_wolf_shape_1")
+    dataset = Archive(root=data / "shrec16", names=names)
+    keys = ("class", "vertices", "faces", "boundary_edges", "nonmanifold_edges", "euler")
+    assert [tuple(row[key] for key in keys) for row in full_shape_rows(dataset)] == [
+        ("cat", 10000, 19940, 60, 12, 12),
+        ("david", 10000, 19950, 52, 0, -1),
+        ("wolf", 4344, 8684, 0, 0, 2),
+    ]
 
 
 @pytest.mark.realdata
