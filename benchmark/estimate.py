@@ -11,13 +11,14 @@ from nonrigid.benchmark.plan import Plan
 from nonrigid.benchmark.run import Run
 from nonrigid.benchmark.runner import plan_runs
 from nonrigid.benchmark.store import Record, Store
-from nonrigid.benchmark.task import absolute
 
 ASSUMED_SECONDS = 60.0
 """Time of a run where nothing like it is finished and its limits allow more."""
 
 ASSUMED_BYTES = 500_000
 """Disk of a run where none is finished: mostly one point a vertex of the part."""
+
+_SAME = ("pair", "settings", "backend", "limits", "starts", "seed", "motion_seed", "metric")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,22 +45,23 @@ class Estimate:
 
 
 def estimate(plan: Plan, out: Path, *, workers: int = 1) -> Estimate:
-    """Estimate what the runs take that `run_plan` would do.
+    """Estimate what the runs take that `run_plan` would do, without reading a mesh.
 
     The time of a run is the median over finished runs of the same method and backend; else over those of the same
     method; else the limit of a solve, or `ASSUMED_SECONDS` where that is less.
     """
     store = Store(out)
-    runs = [run for spec in plan.pairs() for run in plan_runs(plan, absolute(spec))]
-    done = store.finished(run.id for run in runs)
-    known = [store.read_run(run) for run in sorted(done)]
+    runs = [run for spec in plan.pairs() for run in plan_runs(plan, spec, data="")]
+    known = [store.read_run(path.stem) for path in sorted(store.runs.glob("[!.]*.json"))]
+    held = {_key(record) for record in known}
+    done = {run for run in runs if _run_key(run) in held}
     groups: dict[tuple[str, str], list[Run]] = {}
     for run in runs:
         groups.setdefault((run.label, run.backend), []).append(run)
     rows, seconds = [], 0.0
     for (label, backend), members in groups.items():
         each, source = _seconds(members[0], known)
-        left = sum(run.id not in done for run in members)
+        left = sum(run not in done for run in members)
         seconds += left * each
         rows.append(
             {
@@ -71,7 +73,7 @@ def estimate(plan: Plan, out: Path, *, workers: int = 1) -> Estimate:
                 "from": source,
             }
         )
-    size = _bytes(store, done)
+    size = _bytes(store, [record["id"] for record in known])
     return Estimate(
         runs=len(runs),
         finished=len(done),
@@ -92,11 +94,17 @@ def _seconds(run: Run, known: Sequence[Record]) -> tuple[float, str]:
     return min([*bounds, ASSUMED_SECONDS]), "assumed: none is finished"
 
 
-def _bytes(store: Store, done: set[str]) -> float:
+def _key(record: Record) -> tuple[object, ...]:
+    return tuple(record.get(name) for name in _SAME)
+
+
+def _run_key(run: Run) -> tuple[object, ...]:
+    told = {**vars(run), "settings": repr(run.formulation), "limits": repr(run.limits)}
+    return tuple(told[name] for name in _SAME)
+
+
+def _bytes(store: Store, done: Sequence[str]) -> float:
     if not done:
         return ASSUMED_BYTES
-    sizes = [
-        sum(path.stat().st_size for path in store.files(run) if path.is_file())
-        for run in sorted(done)[:: max(1, len(done) // 100)]
-    ]
-    return sum(sizes) / len(sizes)
+    chosen = done[:: max(1, len(done) // 100)]
+    return sum(path.stat().st_size for run in chosen for path in store.files(run) if path.is_file()) / len(chosen)

@@ -83,9 +83,12 @@ def run_plan(
     return records
 
 
-def plan_runs(plan: Plan, spec: PairSpec) -> list[Run]:
-    """Return the runs of one pair: every method with every backend and every accuracy."""
-    data = data_hash(spec.load())
+def plan_runs(plan: Plan, spec: PairSpec, *, data: str | None = None) -> list[Run]:
+    """Return the runs of one pair: every method with every backend and every accuracy.
+
+    `data` is the hash of the pair's meshes; where None, the pair is loaded for it.
+    """
+    data = data_hash(spec.load()) if data is None else data
     return [
         Run(
             pair=spec.name,

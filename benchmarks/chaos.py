@@ -1,9 +1,9 @@
 """Disturb a benchmark in every way that a long one is disturbed, and compare its results with an undisturbed one.
 
-A plan of quick runs, some of which crash, hang or fill their memory on purpose, is killed with SIGKILL at random moments,
-loses a worker, and meets a full disk; it is restarted until it is complete. Then the same plan is done by a Dask scheduler
-with two workers in processes of their own, one of which is killed on the way. Prints what happened as a table; exits with 1
-where results differ, a finished run was lost or done twice, or a process was left running.
+A plan of quick runs, some of which crash, hang or fill their memory on purpose, is killed with SIGKILL at random
+moments, loses a worker, and meets a full disk; it is restarted until it is complete. Then the same plan is done by a
+Dask scheduler with two workers in processes of their own, one of which is killed on the way. Prints what happened as a
+table; exits with 1 where results differ, a finished run was lost or done twice, or a process was left running.
 
     python benchmarks/chaos.py [--small] [--no-dask] [--json] [--seed 0] [--folder DIR]
 """
@@ -93,6 +93,7 @@ run_seconds = {run_seconds}
 [data]
 dataset = "shrec16"
 root = "data"
+splits = {splits}
 [limits]
 memory_gb = 0.3
 """
@@ -109,15 +110,18 @@ class Stage:
 
     @property
     def plan(self) -> Path:
+        """File of the plan."""
         return self.folder / "plan.toml"
 
     def environment(self, events: str) -> dict[str, str]:
+        """Return the environment of a process whose runs note what they do in the file `events`."""
         found = {**os.environ, MARK: str(self.folder), "NONRIGID_CHAOS_EVENTS": str(self.folder / events)}
         found["PYTHONPATH"] = os.pathsep.join(filter(None, [str(self.folder / "site"), os.environ.get("PYTHONPATH")]))
         found["NONRIGID_CACHE"] = str(self.folder / "cache")
         return found | dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
     def start(self, out: Path, events: str, *words: str, limit: int | None = None) -> subprocess.Popen[str]:
+        """Start `nonrigid bench`; `limit` bounds the size of each file that it writes, in bytes."""
         code = "from nonrigid.benchmark.cli import main; main()"
         command = [sys.executable, "-c", code, "bench", str(self.plan), "--out", str(out), "--quiet", "--json", *words]
 
@@ -135,6 +139,7 @@ class Stage:
         )
 
     def say(self, what: str, seen: str, good: bool = True) -> None:
+        """Add a row to the table."""
         self.rows.append((what, seen, good))
         sys.stderr.write(f"{what}: {seen}{'' if good else ' (WRONG)'}\n")
 
@@ -158,6 +163,7 @@ def write_data(root: Path) -> None:
 
 
 def prepare(stage: Stage) -> int:
+    """Write data, method and plan; return the number of runs."""
     write_data(stage.folder / "data")
     site = stage.folder / "site"
     information = site / "nonrigid_chaos-1.dist-info"
@@ -168,19 +174,21 @@ def prepare(stage: Stage) -> int:
     good = 6 if stage.small else 52
     kinds = ["good"] * good + ["crash", "hang", "memory", "fat"]
     stage.rng.shuffle(kinds)
-    text = PLAN.format(run_seconds=3 if stage.small else 8)
+    text = PLAN.format(run_seconds=3 if stage.small else 8, splits='["cuts"]' if stage.small else '["cuts", "holes"]')
     for number, kind in enumerate(kinds):
         settings = f'{{ number = {number}, kind = "{kind}" }}'
         text += f'[[methods]]\nmethod = "trial"\nlabel = "{kind}-{number}"\nsettings = {settings}\n'
     stage.plan.write_text(text)
-    return 2 * len(kinds)
+    return len(kinds) * (1 if stage.small else 2)
 
 
 def finished(out: Path) -> dict[str, float]:
+    """Return the finished runs, and when each was."""
     return {path.stem: path.stat().st_mtime for path in (out / "runs").glob("[!.]*.json")}
 
 
 def results(out: Path) -> dict[str, list[object]]:
+    """Return what has to be the same in two benchmarks."""
     found = {}
     for run in finished(out):
         record = json.loads((out / "runs" / f"{run}.json").read_text())
@@ -212,6 +220,7 @@ def wait_gone(stage: Stage, seconds: float = 10.0) -> float | None:
 
 
 def wait_runs(out: Path, count: int, process: subprocess.Popen[str], seconds: float = 120.0) -> bool:
+    """Wait until so many runs are finished; tell whether they are."""
     deadline = time.monotonic() + seconds
     while time.monotonic() < deadline and process.poll() is None:
         if len(finished(out)) >= count:
@@ -221,6 +230,7 @@ def wait_runs(out: Path, count: int, process: subprocess.Popen[str], seconds: fl
 
 
 def children(process: int) -> list[int]:
+    """Return the child processes of a process."""
     found = []
     for place in Path("/proc").glob("[0-9]*"):
         with contextlib.suppress(OSError):
@@ -231,10 +241,10 @@ def children(process: int) -> list[int]:
 
 @contextlib.contextmanager
 def small_disk(stage: Stage) -> Iterator[tuple[Path, bool]]:
-    """Offer a folder on a file system of 1.2 MB where this user may mount one, else any folder."""
+    """Offer a folder on a file system of 0.5 MB where this user may mount one, else any folder."""
     out = stage.folder / "disturbed"
     out.mkdir()
-    words = ["mount", "-t", "tmpfs", "-o", "size=1200k", "tmpfs", str(out)]
+    words = ["mount", "-t", "tmpfs", "-o", "size=500k", "tmpfs", str(out)]
     mounted = not stage.small and subprocess.run(words, capture_output=True, check=False).returncode == 0
     try:
         yield out, mounted
@@ -247,8 +257,9 @@ def disturb(stage: Stage, out: Path, mounted: bool, total: int) -> set[str]:
     """Kill, fill and restart until the plan is complete; return the runs that began again though they were finished."""
     kills, seen, worst, twice = (1 if stage.small else 10), {}, 0.0, set()
     worker_killed = disk_full = False
-    killed = 0
-    for turn in range(kills + 12):
+    killed = turn = 0
+    while turn < kills + 12:
+        turn += 1
         before = finished(out)
         for run, when in before.items():
             if seen.setdefault(run, when) != when:
@@ -257,7 +268,7 @@ def disturb(stage: Stage, out: Path, mounted: bool, total: int) -> set[str]:
             stage.say("finished runs lost", str(len(set(seen) - set(before))), good=False)
         limit = 9000 if not mounted and not disk_full else None
         process = stage.start(out, "events.txt", "--jobs", "2", limit=limit)
-        want = min(len(before) + stage.rng.randint(1, 2 if stage.small else 9), total)
+        want = min(len(before) + stage.rng.randint(1, 2 if stage.small else 6), total)
         if not worker_killed and disk_full and wait_runs(out, want, process):
             workers = [child for child in children(process.pid) if children(child)]
             if workers:
@@ -277,7 +288,7 @@ def disturb(stage: Stage, out: Path, mounted: bool, total: int) -> set[str]:
         worst = max(worst, 99.0 if gone is None else gone)
         if "results cannot be written" in words:
             disk_full = True
-            how = "a file system of 1.2 MB" if mounted else "a limit on the size of files"
+            how = "a file system of 0.5 MB" if mounted else "a limit on the size of files"
             stage.say("disk full", f"{how}, exit code {process.returncode}: {' '.join(words.split())[:150]}")
             if mounted:
                 subprocess.run(["mount", "-o", "remount,size=200m", str(out)], check=True)
@@ -286,7 +297,7 @@ def disturb(stage: Stage, out: Path, mounted: bool, total: int) -> set[str]:
         elif process.returncode != -signal.SIGKILL:
             stage.say("unexpected end", f"code {process.returncode}: {words[-300:]}", good=False)
             break
-    stage.say("killed with SIGKILL", f"{killed} times, restarts {turn + 1}", killed == kills)
+    stage.say("killed with SIGKILL", f"{killed} times, restarts {turn - 1}", killed == kills)
     stage.say("worker killed once", str(worker_killed), worker_killed)
     stage.say("disk full once", str(disk_full), disk_full)
     stage.say("processes left by a killed benchmark", f"none after {worst:.2g} s", worst < 10.0)
@@ -297,6 +308,7 @@ def disturb(stage: Stage, out: Path, mounted: bool, total: int) -> set[str]:
 
 
 def compare(stage: Stage, name: str, out: Path, truth: dict[str, list[object]], total: int) -> None:
+    """Compare results with those of the undisturbed benchmark."""
     found = results(out)
     differing = [run for run in truth if found.get(run) != truth[run]]
     good = not differing and len(found) == len(truth) == total
@@ -304,6 +316,7 @@ def compare(stage: Stage, name: str, out: Path, truth: dict[str, list[object]], 
 
 
 def count_statuses(out: Path) -> str:
+    """Return how many runs ended with which status."""
     count: dict[str, int] = {}
     for values in results(out).values():
         count[str(values[0])] = count.get(str(values[0]), 0) + 1

@@ -70,6 +70,10 @@ def test_the_sixteen_pairs_are_there(data: Path) -> None:
         ("[data]", "metric = 'crow'\n[data]", "crow"),
         ("[data]", "starts = 0\n[data]", "starts is 0"),
         ("[data]", "seed = 1.5\n[data]", "seed is 1.5"),
+        ("[data]", "accuracy = 'best'\n[data]", "unknown accuracy 'best'; choose one of: high, low, mid"),
+        ("[data]", "accuracy = ['low', 'low']\n[data]", "name each once"),
+        ("[data]", "run_seconds = -1\n[data]", "run_seconds is -1"),
+        ("seconds = 5", "memory_gb = 0", "memory_gb is 0"),
         ('[[methods]]\nmethod = "gt"', '[[methods]]\nmethod = "gt"\n[[methods]]\nmethod = "gt"', "own label"),
     ],
 )
@@ -96,3 +100,18 @@ def test_data_can_be_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         read_plan("gt16", data=tmp_path).pairs()
     with pytest.raises(NonrigidError, match="leave out --data"):
         read_plan("demo", data=tmp_path)
+
+
+def test_each_accuracy_is_a_run_with_its_own_tolerances(tmp_path: Path) -> None:
+    (tmp_path / "p.toml").write_text(GOOD.replace("[data]", 'accuracy = ["low", "high"]\nrun_seconds = 90\n[data]'))
+    plan = read_plan(tmp_path / "p.toml")
+    assert [(word, limits.tolerance, limits.seconds) for word, limits in plan.variants()] == [
+        ("low", 1e-3, 5),
+        ("high", 1e-9, 5),
+    ]
+    assert plan.run_seconds == 90
+    (tmp_path / "p.toml").write_text(
+        GOOD.replace("[data]", 'accuracy = "low"\n[data]').replace("seconds = 5", "tolerance = 1e-3")
+    )
+    with pytest.raises(NonrigidError, match=r"both accuracy = \['low'\] and \[limits\] tolerance"):
+        read_plan(tmp_path / "p.toml")

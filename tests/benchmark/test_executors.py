@@ -1,0 +1,47 @@
+"""Executors are named in words, refused with a reason, and plans are estimated before they are run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from nonrigid.benchmark.executors import Dask, Executor, InProcess, Joblib, make_executor
+from nonrigid.geometry.errors import InputError, UnknownNameError
+
+
+def test_executors_are_named() -> None:
+    assert make_executor("joblib", workers=3) == Joblib(workers=3)
+    assert make_executor("inprocess") == InProcess()
+    assert make_executor("dask", scheduler="tcp://h:1") == Dask(scheduler="tcp://h:1")
+    assert all(isinstance(make_executor(kind), Executor) for kind in ("joblib", "dask", "inprocess"))
+
+
+@pytest.mark.parametrize(
+    ("kind", "more", "words"),
+    [
+        ("slurm", {}, "unknown executor 'slurm'; choose one of: dask, inprocess, joblib"),
+        ("joblib", {"workers": 0}, "--jobs is 0"),
+        ("joblib", {"scheduler": "tcp://h:1"}, "give --executor dask"),
+        ("inprocess", {"workers": 2}, "inprocess is one process"),
+    ],
+)
+def test_a_wrong_executor_is_refused(kind: str, more: dict[str, Any], words: str) -> None:
+    with pytest.raises((InputError, UnknownNameError), match=words):
+        make_executor(kind, **more)
+
+
+def test_a_dry_run_estimates_and_runs_nothing(tmp_path: Path, nonrigid: Callable[..., Any]) -> None:
+    answer = nonrigid("bench", "demo", "--out", tmp_path / "out", "--dry-run", "--jobs", "2")
+    assert answer.code == 0, answer.err
+    assert "40 runs, 0 finished; the other 40 take about 0.017 h with 2 processes" in answer.out
+    assert "assumed: none is finished" in answer.out
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_share_is_written_as_a_fraction(tmp_path: Path, nonrigid: Callable[..., Any]) -> None:
+    answer = nonrigid("bench", "demo", "--out", tmp_path, "--share", "3/2")
+    assert answer.code == 2
+    assert "--share is '3/2'" in answer.err
