@@ -6,11 +6,9 @@ from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
-from nonrigid.benchmark.datasets.files import FileSource
-from nonrigid.benchmark.datasets.protocols import Dataset, PairSpec
+from nonrigid.benchmark.datasets.protocols import Dataset
+from nonrigid.benchmark.datasets.statistics import boundary_loops, part_statistics
 from nonrigid.geometry.clean import clean
 from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.mesh import Mesh
@@ -47,17 +45,6 @@ def mesh_facts(mesh: Mesh) -> Row:
     }
 
 
-def boundary_loops(mesh: Mesh) -> int:
-    """Return the number of pieces of the boundary; loops that meet in a vertex count as one."""
-    edges = mesh.boundary_edges
-    if not len(edges):
-        return 0
-    vertices, place = np.unique(edges, return_inverse=True)
-    i, j = place.reshape(edges.shape).T
-    graph = coo_array((np.ones(len(i)), (i, j)), shape=(len(vertices), len(vertices)))
-    return int(connected_components(graph, directed=False)[0])
-
-
 def full_shape_rows(dataset: Dataset) -> list[Row]:
     """Return one row a full shape: its set, its class and `mesh_facts`."""
     rows: dict[tuple[str, str], Row] = {}
@@ -69,32 +56,31 @@ def full_shape_rows(dataset: Dataset) -> list[Row]:
 
 
 def part_rows(dataset: Dataset, *, progress: Callable[[str], None] | None = None) -> list[Row]:
-    """Return one row a part: set, split, class, source pose, `mesh_facts`, and the share of the area kept."""
-    areas: dict[FileSource, float] = {}
+    """Return one row a part: set, split, class, source pose, `part_statistics` and `mesh_facts`."""
     rows = []
     for spec in dataset.pairs():
         if progress is not None:
             progress(spec.name)
-        part = spec.load_part()
+        data = spec.load()
         rows.append(
             {
                 "set": spec.metadata.get("archive", dataset.name),
-                "split": spec.split,
-                "class": spec.class_name,
-                "name": spec.name,
-                "source_pose": spec.source_pose,
+                **part_statistics(data),
                 "own_pose": spec.own_pose,
-                "truth": spec.truth is not None,
-                "mirrored": spec.mirrored is not None,
-                "area_kept": part.area / _full_area(spec, areas),
-                **mesh_facts(part),
+                "truth": data.truth is not None,
+                "mirrored": data.mirrored is not None,
+                **mesh_facts(data.part),
             }
         )
     return rows
 
 
 def summary_rows(parts: Sequence[Mapping[str, object]]) -> list[Row]:
-    """Return one row a split and class, and one a split, with ranges over its parts."""
+    """Return one row a split and class, and one a split, with ranges over its parts.
+
+    `boundary_length` is a mean, in units of sqrt(area of the full shape); `edge_ratios` are the means of the 5th and
+    95th percentiles of mapped by own length, over the edges of a part.
+    """
     groups: dict[tuple[str, str, str], list[Mapping[str, object]]] = defaultdict(list)
     for row in parts:
         groups[str(row["set"]), str(row["split"]), str(row["class"])].append(row)
@@ -115,21 +101,19 @@ def _summary(rows: Sequence[Mapping[str, object]]) -> Row:
         "area_kept": f"{min(kept):.2f}-{max(kept):.2f}",
         "mean_area_kept": round(float(np.mean(kept)), 4),
         "boundary_loops": _range(rows, "boundary_loops"),
+        "boundary_length": _mean(rows, "boundary_length"),
+        "edge_ratios": "" if rows[0]["ratio_5"] is None else f"{_mean(rows, 'ratio_5')}-{_mean(rows, 'ratio_95')}",
         "nonmanifold_edges": sum(int(str(row["nonmanifold_edges"])) for row in rows),
         "with_defects": sum(bool(row["defects"]) for row in rows),
         "truth": " or ".join(sorted(words[pair] for pair in truths)),
     }
 
 
+def _mean(rows: Sequence[Mapping[str, object]], key: str) -> float:
+    values = [float(str(row[key])) for row in rows if row[key] is not None]
+    return round(float(np.mean(values)), 3) if values else float("nan")
+
+
 def _range(rows: Sequence[Mapping[str, object]], key: str) -> str:
     values = [int(str(row[key])) for row in rows]
     return f"{min(values)}-{max(values)}" if min(values) < max(values) else str(values[0])
-
-
-def _full_area(spec: PairSpec, areas: dict[FileSource, float]) -> float:
-    """Return the area of the full shape, which many parts share."""
-    if callable(spec.full):
-        return spec.load_full().area
-    if spec.full not in areas:
-        areas[spec.full] = spec.load_full().area
-    return areas[spec.full]

@@ -43,7 +43,7 @@ def part_statistics(data: PairData) -> dict[str, object]:
         "faces": len(part.faces),
         "area_kept": data.kept_area,
         "boundary_length": float(_lengths(part, part.boundary_edges).sum() / unit),
-        "boundary_loops": _loops(part),
+        "boundary_loops": boundary_loops(part),
         "mean_edge": float(_lengths(part, part.edges).mean() / unit),
         "ratio_5": ratios[0],
         "ratio_50": ratios[1],
@@ -79,7 +79,8 @@ def _lengths(mesh: Mesh, edges: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1))
 
 
-def _loops(mesh: Mesh) -> int:
+def boundary_loops(mesh: Mesh) -> int:
+    """Return the number of pieces of the boundary; loops that meet in a vertex count as one."""
     edges = mesh.boundary_edges
     vertices, ends = np.unique(edges, return_inverse=True)
     i, j = ends.reshape(-1, 2).T
