@@ -10,10 +10,24 @@ from nonrigid.benchmark.held_out import trained_for
 from nonrigid.benchmark.methods import make_method, methods
 from nonrigid.formulations.formulation import Formulation, Pair
 from nonrigid.formulations.model import Problem
-from nonrigid.solvers.acceptance import Native, Via
+from nonrigid.solvers.acceptance import Acceptance, Claim, Native, Refused, Via
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.route import route
 from nonrigid.solvers.solve import solve
+
+REQUIRED = {
+    "gt": ("gt", "game"),
+    "en": ("en", "elastic-net"),
+    "im-sparse": ("im", "sparse"),
+    "im-extension": ("im", "extension"),
+    "pfm-C": ("pfm", "C"),
+    "pfm-v": ("pfm", "v"),
+    "rf-lowpass": ("rf", "low-pass"),
+}
+"""Problems that every general backend must have a route for: a word, the method and its stage."""
+
+GENERAL = ("nlopt", "casadi", "cvxpy")
+"""Backends that must have a route for each of `REQUIRED`."""
 
 MANY = 50
 """Whole-number settings from here on count samples, and are divided by this for the small instance."""
@@ -48,6 +62,7 @@ def solver_matrix(
             answers = {} if few is None else {(r.backend, r.algorithm): str(r.acceptance) for r in route(few)}
             rows += [
                 {
+                    "cell": _cell(name, stage),
                     "method": name,
                     "problem": stage,
                     "backend": row.backend,
@@ -55,12 +70,25 @@ def solver_matrix(
                     "variables": _size(problem),
                     "answer": str(row.acceptance),
                     "accepted": isinstance(row.acceptance, Native | Via),
+                    "claim": _claim(row.acceptance),
                     "small_variables": None if few is None else _size(few),
                     "small_answer": answers.get((row.backend, row.algorithm)),
                 }
                 for row in route(problem)
             ]
     return rows
+
+
+def empty_cells(rows: Sequence[Mapping[str, object]]) -> tuple[tuple[str, str], ...]:
+    """Return the required (problem, backend) for which no algorithm takes the problem at its usual size.
+
+    Examples
+    --------
+    >>> empty_cells([{"cell": "gt", "backend": "nlopt", "accepted": True}])[:2]
+    (('gt', 'casadi'), ('gt', 'cvxpy'))
+    """
+    filled = {(row["cell"], row["backend"]) for row in rows if row["accepted"]}
+    return tuple((cell, backend) for cell in REQUIRED for backend in GENERAL if (cell, backend) not in filled)
 
 
 def stated_problems(pair: Pair, formulation: Formulation) -> dict[str, Problem]:
@@ -78,6 +106,19 @@ def stated_problems(pair: Pair, formulation: Formulation) -> dict[str, Problem]:
     except StopIteration:
         pass
     return found
+
+
+def _cell(method: str, stage: str) -> str:
+    """Return the word of a required problem, of any other its method and stage."""
+    return next((cell for cell, place in REQUIRED.items() if place == (method, stage)), f"{method}-{stage}")
+
+
+def _claim(acceptance: Acceptance) -> str | None:
+    """Return the weakest claim along a route, None for a refusal."""
+    if isinstance(acceptance, Refused):
+        return None
+    bridges = acceptance.bridges if isinstance(acceptance, Via) else ()
+    return next((b.claim.value for b in bridges if b.claim is not Claim.EXACT), Claim.EXACT.value)
 
 
 def _fewer(formulation: Formulation) -> dict[str, object]:
