@@ -1,6 +1,7 @@
 # make          create .venv with everything the project needs
 # make demo     compare ten solvers on built-in data, print the table, write the report to demo-results/
 # make test     every test
+# make browser  look at the demo's report in a headless Chromium (installed, or named in NONRIGID_BROWSER)
 # make check    lint, format, types, layers
 
 PYTHON ?= python3
@@ -8,7 +9,7 @@ BIN := .venv/bin
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: all demo test check clean
+.PHONY: all demo test browser check clean
 
 all: .venv/ready
 
@@ -27,6 +28,9 @@ demo: .venv/ready
 
 test: .venv/ready
 	$(BIN)/python -m pytest -n 2
+
+browser: demo
+	$(BIN)/python tests/browser/check.py demo-results
 
 check: .venv/ready
 	$(BIN)/ruff check .

@@ -10,7 +10,7 @@ import typer
 
 from nonrigid.benchmark.commands.summary import show_summary
 from nonrigid.benchmark.report.table import notes, summary
-from nonrigid.benchmark.report.write import draw_figures, write_report
+from nonrigid.benchmark.report.write import draw_figures, pair_specs, write_report
 from nonrigid.benchmark.store import Store
 from nonrigid.benchmark.terminal import say, show_json
 from nonrigid.geometry.errors import InputError
@@ -41,11 +41,12 @@ def report_command(
         return
     page = write_report(folder, index, records, data=data, jobs=jobs)
     rows = summary(records)
+    known = [*notes(index, records), *filter(None, [pair_specs(folder, data)[1]])]
     if json:
-        show_json({"title": index["title"], "page": str(page), "rows": rows, "notes": notes(index, records)})
+        show_json({"title": index["title"], "page": str(page), "rows": rows, "notes": known})
     else:
         show_summary(index["title"], rows)
-        for note in notes(index, records):
+        for note in known:
             say(note)
         say(f"Report: {page.resolve()}")
     if open_page and not webbrowser.open(page.resolve().as_uri()):

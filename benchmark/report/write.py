@@ -110,14 +110,17 @@ def draw_figures(out: Path, records: Sequence[Record], only: str | None = None) 
     return sketches
 
 
+def pair_specs(folder: Path, data: Path | None = None) -> tuple[dict[str, PairSpec], str]:
+    """Return the pairs of a folder's plan by name, and why they cannot be shown where their files are not found."""
+    try:
+        return {spec.name: spec for spec in read_plan(folder / "plan.toml", data=data).pairs()}, ""
+    except NonrigidError as failure:
+        return {}, f"The surfaces cannot be shown: {failure}. Give their folder: nonrigid report DIR --data FOLDER."
+
+
 def _write_pairs(folder: Path, records: Sequence[Record], data: Path | None, jobs: int) -> list[str]:
     """Write the pages of all pairs, and return what to know about them."""
-    specs: dict[str, PairSpec] = {}
-    problem = ""
-    try:
-        specs = {spec.name: spec for spec in read_plan(folder / "plan.toml", data=data).pairs()}
-    except NonrigidError as failure:
-        problem = f"The surfaces cannot be shown: {failure}. Give their folder: nonrigid report DIR --data FOLDER."
+    specs, problem = pair_specs(folder, data)
     groups: dict[str, list[Record]] = {}
     for record in records:
         groups.setdefault(record["pair"], []).append(record)
