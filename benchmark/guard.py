@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import signal
 import time
@@ -129,6 +130,7 @@ def _child(
     pipe: Connection, parent: int, work: Callable[[Tell], None], memory_gb: float | None, log: Path | None
 ) -> None:
     die_with_parent(parent)
+    gc.freeze()  # what was inherited is not collected here: to look at it would copy it, page by page
     if hasattr(os, "setpgid"):
         os.setpgid(0, 0)  # so that its own children can be killed with it
     try:
