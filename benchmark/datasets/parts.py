@@ -17,7 +17,7 @@ from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.partial import Restriction, restrict
 from nonrigid.geometry.points import SurfacePoints
 
-RECIPE_VERSION = 2
+RECIPE_VERSION = 3
 """Part of the cache's keys: raise it whenever the same parameters give other parts."""
 
 PLANES = 6

@@ -68,7 +68,7 @@ def test_creatures_move_nearly_isometrically(pairs: list[PairData]) -> None:
             assert points is not None
             place = points.positions(pair.full)
             low, middle, high = np.percentile(np.linalg.norm(place[i] - place[j], axis=1) / long, [5, 50, 95])
-            assert 0.8 < low < high < 1.25
+            assert 0.75 < low < high < 1.3
             assert 0.97 < middle < 1.03
 
 

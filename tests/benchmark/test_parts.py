@@ -48,7 +48,7 @@ def test_impossible_holes_are_refused() -> None:
     with pytest.raises(InputError, match=r"keep is 1.5"):
         grow_holes(BALL, holes=3, keep=1.5, seed=0)
     with pytest.raises(InputError, match="cannot grow"):
-        grow_holes(BALL, holes=300, keep=0.001, seed=0)
+        grow_holes(BALL, holes=300, keep=1e-9, seed=0)
 
 
 @settings(max_examples=8, deadline=None)
