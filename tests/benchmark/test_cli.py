@@ -124,7 +124,9 @@ def _bad_meshes(folder: Path, person: PairData) -> None:
     (folder / "empty.off").write_text("OFF\n0 0 0\n")
     (folder / "flat.off").write_text("OFF\n3 1 0\n0 0 0\n1 0 0\n2 0 0\n3 0 1 2\n")
     moved = np.vstack([person.part.vertices, person.part.vertices + 100])
-    write_off(Mesh(moved, np.vstack([person.part.faces, person.part.faces + len(person.part.vertices)])), folder / "two.off")
+    write_off(
+        Mesh(moved, np.vstack([person.part.faces, person.part.faces + len(person.part.vertices)])), folder / "two.off"
+    )
     (folder / "short.baryc_gt").write_text("1.0 1 0 0\n")
     (folder / "mesh.txt").write_text("OFF")
 
