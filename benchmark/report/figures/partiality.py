@@ -62,7 +62,7 @@ def error_by_missing_area(series: Sequence[Series]) -> list[Sketch]:
                         markersize=5,
                     )
                 axes.set(xlabel=f"{_BINS[bins]} (%)", title=split if bins == "disjoint" else None)
-                axes.set_ylim(0, 1.05 * highest)
+                axes.set(xlim=(0, 102), ylim=(0, 1.05 * highest))
                 axes.grid(color=FAINT, linewidth=0.6)
             line[0].set_ylabel("mean error x100")
         legend(figure)
