@@ -17,7 +17,7 @@ def centaur(poses: tuple[Pose, ...]) -> Anatomy:
     frame, _, tail = HORSE
     bones, flesh = trunk_and_legs(frame, tail)
     top, front = _SIZE * frame.shoulder[0] + 0.24, _SIZE * frame.shoulder[1] + 0.07
-    upper_bones, upper_flesh = torso_and_head(replace(ATHLETE, finger=1.3), floor=top - 0.1, ahead=front)
+    upper_bones, upper_flesh = torso_and_head(replace(ATHLETE, finger=1.15), floor=top - 0.1, ahead=front)
     hip = Ellipsoid(
         bone="pelvis", centre=(0, top - 0.12, front - 0.03), radii=(0.145, 0.24, 0.13), turn=(-8, 0, 0), blend=0.03
     )
