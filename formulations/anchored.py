@@ -13,9 +13,9 @@ from nonrigid.formulations.games import game
 from nonrigid.formulations.interpolation import closest_feature_points
 from nonrigid.formulations.model import ElasticNet, Problem
 from nonrigid.formulations.sampled_distances import SampledDistances, sampled_distances
-from nonrigid.formulations.spectral_growth import bases, grown
+from nonrigid.formulations.spectral_growth import Bases, bases, grown
 from nonrigid.formulations.trusted_descriptors import trusted_descriptors
-from nonrigid.geometry.arrays import IntArray
+from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.maps import nearest_rows
 
@@ -32,7 +32,7 @@ class Start:
     placing_weight: float = 1.0
 
 
-STARTS = (Start(), Start(kernel_width=1.6, placing_weight=3.0), Start(mix=0.0), Start(placing_weight=3.0))
+STARTS = (Start(), Start(kernel_width=1.6, placing_weight=3.0), Start(placing_weight=3.0), Start(mix=0.0))
 """Starts in the order in which they are tried."""
 
 
@@ -68,8 +68,11 @@ class Anchored:
         are placed by distances, and beside eigenfunctions.
     fitted_samples
         Samples of the part to which functional maps are fitted.
-    first_size, steps
-        Eigenfunctions of the part in the first map, and number of maps.
+    first_size, steps, last_steps
+        Eigenfunctions of the part in the first map, number of maps of each start, and of the best one once more: slower
+        growth is mostly, but not always, better; the mean confidence decides.
+    components
+        Principal components of the descriptors that stand beside eigenfunctions while maps grow; in the end, all.
     starts, enough
         Largest number of starts, and the mean confidence at which no other is tried; the one with the highest mean
         confidence wins.
@@ -99,8 +102,10 @@ class Anchored:
     fitted_samples: int = 1000
     first_size: int = 20
     steps: int = 5
+    last_steps: int = 20
+    components: int = 80
     starts: int = 4
-    enough: float = 0.75
+    enough: float = 0.85
     part_size: int = 100
     full_size: int = 200
 
@@ -108,7 +113,9 @@ class Anchored:
 
     def stages(self, pair: Pair) -> Stages:
         """State the game, then one map a step; return one point a vertex of the part."""
-        for name, value, most in (("steps", self.steps, 1000), ("starts", self.starts, len(STARTS))):
+        bounds = (("steps", 1000), ("last_steps", 1000), ("starts", len(STARTS)))
+        for name, most in bounds:
+            value = getattr(self, name)
             if not 1 <= value <= most:
                 raise InputError(f"{name} is {value}", remedy=f"give a number from 1 to {most}")
         descriptors = trusted_descriptors(pair, self.radii, power=self.trust_power)
@@ -120,19 +127,21 @@ class Anchored:
             full_samples=self.full_samples,
         )
         basis = bases(
-            pair, descriptors, part_size=self.part_size, full_size=self.full_size, descriptor_weight=self.growing_weight
+            pair,
+            descriptors,
+            part_size=self.part_size,
+            full_size=self.full_size,
+            descriptor_weight=self.growing_weight,
+            components=self.components,
         )
-        best, C = -1.0, np.empty((0, 0))
+        best = Grown(-1.0, np.empty((0, 0)), np.empty(0, dtype=np.int64))
         for start in STARTS[: self.starts]:
             rows = yield from self._anchored(samples, start)
-            grew, images = yield from grown(
-                basis, samples.points, samples.grid[rows], basis.sizes(self.first_size, self.steps)
-            )
-            score = float(samples.confidence(pair, samples.points, images, width=KEEPING).mean())
-            if score > best:
-                best, C = score, grew
-            if best >= self.enough:
+            best = max(best, (yield from self._grown(pair, basis, samples, rows, self.steps)))
+            if best.score >= self.enough:
                 break
+        best = max(best, (yield from self._grown(pair, basis, samples, best.rows, self.last_steps)))
+        C = best.C
         queries, features = basis.features(C, slice(None))
         nearest = nearest_rows(queries, features)[0]
         found = closest_feature_points(queries, features, pair.full.mesh, nearest)
@@ -153,3 +162,24 @@ class Anchored:
             sure = samples.surest(images, self.kept)
             images = samples.placed(sure, images[sure], reach=self.local_reach, descriptor_weight=weight)
         return images
+
+    def _grown(
+        self, pair: Pair, basis: Bases, samples: SampledDistances, rows: IntArray, steps: int
+    ) -> Generator[Problem, Solved, Grown]:
+        """Grow a map from images of the samples, and score it."""
+        C, images = yield from grown(
+            basis, samples.points, samples.grid[rows], basis.sizes(self.first_size, steps), grid=samples.grid
+        )
+        return Grown(float(samples.confidence(pair, samples.points, images, width=KEEPING).mean()), C, rows)
+
+
+@dataclass(frozen=True, eq=False)
+class Grown:
+    """Hold a functional map, the mean confidence of what is read off it, and the images that it grew from."""
+
+    score: float
+    C: FloatArray
+    rows: IntArray
+
+    def __lt__(self, other: Grown) -> bool:
+        return self.score < other.score
