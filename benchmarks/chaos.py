@@ -268,7 +268,7 @@ def disturb(stage: Stage, out: Path, mounted: bool, total: int) -> set[str]:
             stage.say("finished runs lost", str(len(set(seen) - set(before))), good=False)
         limit = 9000 if not mounted and not disk_full else None
         process = stage.start(out, "events.txt", "--jobs", "2", limit=limit)
-        want = min(len(before) + stage.rng.randint(1, 2 if stage.small else 6), total)
+        want = min(len(before) + (1 if stage.small else stage.rng.randint(1, 6)), total)
         if not worker_killed and disk_full and wait_runs(out, want, process):
             workers = [child for child in children(process.pid) if children(child)]
             if workers:

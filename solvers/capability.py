@@ -13,6 +13,10 @@ from nonrigid.solvers.acceptance import Acceptance, Bridge, Native, Refused, Via
 from nonrigid.solvers.layout import Layout
 
 
+_MOST_ENTRIES = 10_000_000
+"""Largest Jacobian of constraints, in numbers of 8 bytes: methods keep several copies."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Capability:
     """State what an algorithm takes beside bounds.
@@ -49,10 +53,26 @@ class Capability:
             kind = item.constraint.kind
             if not takes[kind]:
                 return f"it takes no {words[kind]} constraints, and {item.name!r} is one"
+        large = too_many_conditions(problem)
+        if large is not None:
+            return large
         loose = int(sum(np.sum(~np.isfinite(bound)) for bound in layout.bounds()))
         if self.finite_bounds and loose:
             return f"it needs finite bounds, and {loose} of {2 * layout.size} bounds are infinite; use a Box"
         return None
+
+
+def too_many_conditions(problem: Problem) -> str | None:
+    """Return why the Jacobian of the constraints, a dense matrix, cannot be held; None if it can."""
+    layout = Layout(problem)
+    rows = sum(item.constraint.count or 0 for item in layout.constraints())
+    entries = rows * layout.size
+    if entries <= _MOST_ENTRIES:
+        return None
+    return (
+        f"it needs the Jacobian of {rows} constraints in {layout.size} unknowns as a dense matrix of {entries:.2g} "
+        f"entries, at most {_MOST_ENTRIES:.2g} work; take fewer samples or native:conditional_gradient"
+    )
 
 
 def accept(

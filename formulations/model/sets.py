@@ -24,11 +24,14 @@ class SmoothConstraint:
         Takes the variable's array; returns c, (m,), and its Jacobian, (m, size of the variable).
     linear
         Whether c is affine.
+    count
+        m, where it is large and the Jacobian, which is dense, therefore too.
     """
 
     kind: Literal["equal", "at most"]
     value_and_jacobian: Callable[[FloatArray], tuple[FloatArray, FloatArray]]
     linear: bool = False
+    count: int | None = None
 
     def violation(self, x: FloatArray) -> float:
         """Return the largest violation at x."""

@@ -131,7 +131,7 @@ class Nlopt:
             if oracle.interrupted is not None:  # some methods replace the oracle's signal by one of their own
                 raise oracle.interrupted from None
             if not str(failure):
-                raise RuntimeError("NLopt failed without a word, as its line searches do where no step helps") from None
+                return Raw(None, "NLopt failed without a word, as its line searches do where no step helps")
             raise
         return Raw(np.asarray(x, float), _words(optimizer.last_optimize_result()))
 

@@ -11,6 +11,12 @@ from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.acceptance import Acceptance, Refused
 from nonrigid.solvers.acceptance import Native as TakenAsIs
 from nonrigid.solvers.backend import Raw
+from nonrigid.solvers.backends.native.conditional_gradient import (
+    conditional_gradient,
+    conditional_gradient_pot,
+    network_obstacle,
+    transport_problem,
+)
 from nonrigid.solvers.backends.native.generalised_power import generalised_power
 from nonrigid.solvers.backends.native.infection_immunisation import infection_immunisation
 from nonrigid.solvers.backends.native.injective_maps import branch_and_bound, exhaustive
@@ -39,6 +45,8 @@ _GENERAL = {
     "reweighted": reweighted,
     "procrustes": procrustes,
     "least_squares": least_squares,
+    "conditional_gradient": conditional_gradient,
+    "conditional_gradient_pot": conditional_gradient_pot,
 }
 _PROVING = {"branch_and_bound": branch_and_bound, "exhaustive": exhaustive, "matching": matching}
 _MOST_MAPS = 5_000_000
@@ -75,6 +83,8 @@ class Native:
             return "branch_and_bound"
         if not isinstance(linear_assignment(problem), str):
             return "matching"
+        if not isinstance(transport_problem(problem), str):
+            return "conditional_gradient"
         return "limited_memory" if Capability().obstacle(problem) is None else "projected_gradient"
 
     def accepts(self, problem: Problem) -> Acceptance:
@@ -106,6 +116,11 @@ class Native:
         if self.algorithm == "procrustes":
             gain = procrustes_gain(problem)
             return f"it needs {gain}" if isinstance(gain, str) else None
+        if self.algorithm == "conditional_gradient_pot":
+            return network_obstacle(problem)
+        if self.algorithm == "conditional_gradient":
+            plans = transport_problem(problem)
+            return f"it needs {plans}" if isinstance(plans, str) else None
         known = regression(problem) if self.algorithm == "least_squares" else robust_regression(problem)
         return f"it needs {known}" if isinstance(known, str) else None
 

@@ -15,11 +15,11 @@ def regression(problem: Problem) -> SquaredResidual | str:
     """Return the one term of min ||C A - B||_F^2 over all matrices C, or say what keeps the problem from being so."""
     wanted = "one free matrix and one term ||C A - B||_F^2, minimized"
     if problem.constraints or len(problem.memberships) != 1 or len(problem.objective.terms) != 1:
-        return wanted
+        return f"{wanted}, not {len(problem.objective.terms)} of {', '.join(map(str, problem.memberships))}"
     applied, member = problem.objective.terms[0], problem.memberships[0]
     weight = applied.weight if problem.objective.sense is Sense.MINIMIZE else -applied.weight
     if not isinstance(applied.term, SquaredResidual) or weight <= 0.0:
-        return f"{wanted}, not {problem.objective.sense.value} {applied}"
+        return f"{wanted}, not {problem.objective.sense.value} {applied} with {member}"
     low, high = member.set.bounds(member.variable.shape)
     if np.isfinite(low).any() or np.isfinite(high).any() or member.set.constraints(low.shape):
         return f"{wanted}, not {member}"
