@@ -14,7 +14,9 @@ from nonrigid.solvers.oracle import Oracle
 def regression(problem: Problem) -> SquaredResidual | str:
     """Return the one term of min ||C A - B||_F^2 over all matrices C, or say what keeps the problem from being so."""
     wanted = "one free matrix and one term ||C A - B||_F^2, minimized"
-    if problem.constraints or len(problem.memberships) != 1 or len(problem.objective.terms) != 1:
+    if problem.constraints:
+        return f"no named constraints, and {sorted(problem.constraints)} stand in the problem"
+    if len(problem.memberships) != 1 or len(problem.objective.terms) != 1:
         return f"{wanted}, not {len(problem.objective.terms)} of {', '.join(map(str, problem.memberships))}"
     applied, member = problem.objective.terms[0], problem.memberships[0]
     weight = applied.weight if problem.objective.sense is Sense.MINIMIZE else -applied.weight
