@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from nonrigid.formulations.distortion import Sides
 from nonrigid.formulations.formulation import Pair, Stages
-from nonrigid.formulations.games import game, local_players, payoffs, players, read_out
+from nonrigid.formulations.games import GameSettings, game, local_players, payoffs, players, read_out
 from nonrigid.formulations.model import ElasticNet
 
 
 @dataclass(frozen=True, kw_only=True)
-class ElasticNetMatching:
+class ElasticNetMatching(GameSettings):
     """Match by the shares that maximize u'Au over the elastic net (1 - mix) 1'u + mix u'u = 1, u >= 0.
 
     mix = 0 is the game of `GameTheoretic`, whose maximizers are sparse; mix = 1 the leading eigenvector of spectral
@@ -29,7 +28,7 @@ class ElasticNetMatching:
     floor
         Share, relative to the largest, down to which candidates are read out.
     kernel_width, part_samples, full_samples, per_sample, radii, sides, excess_weight, local_candidates, local_reach
-        As in `nonrigid.formulations.game_theoretic.GameTheoretic`; `local_candidates` 0 for no second problem.
+        See `nonrigid.formulations.games.GameSettings`.
 
     Source: Rodola, Torsello, Harada, Kuniyoshi and Cremers, elastic net constraints for shape matching (ICCV 2013);
     SHREC'16 eqs. (11) to (13). The numbers but `mix` are this package's choice.
@@ -42,15 +41,6 @@ class ElasticNetMatching:
 
     mix: float = 0.8
     floor: float = 0.35
-    kernel_width: float = 0.03
-    part_samples: int = 300
-    full_samples: int = 1000
-    per_sample: int = 10
-    radii: tuple[float, ...] = (0.04, 0.10)
-    sides: Sides = "two-sided"
-    excess_weight: float = 0.3
-    local_candidates: int = 6
-    local_reach: float = 0.15
 
     method: ClassVar[str] = "en"
 

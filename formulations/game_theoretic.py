@@ -10,9 +10,8 @@ from typing import ClassVar
 import numpy as np
 
 from nonrigid.formulations.candidates import Candidates
-from nonrigid.formulations.distortion import Sides
 from nonrigid.formulations.formulation import Pair, Solved, Stages
-from nonrigid.formulations.games import game, local_players, payoffs, players, read_out
+from nonrigid.formulations.games import GameSettings, game, local_players, payoffs, players, read_out
 from nonrigid.formulations.model import Problem, Simplex
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.errors import InputError
@@ -22,7 +21,7 @@ NEGLIGIBLE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class GameTheoretic:
+class GameTheoretic(GameSettings):
     """Match by the stable groups of a game between candidate matches: maximize u'Au over the simplex.
 
     Two candidates earn A = exp(-alpha eps^2) from each other if distances agree up to eps, nothing if they share a
@@ -33,22 +32,14 @@ class GameTheoretic:
 
     Parameters
     ----------
-    kernel_width
-        Distortion at which two matches earn one half, in units of sqrt(full area).
-    part_samples, full_samples, per_sample, radii
-        Candidates of the first game; see `candidate_matches`.
-    sides, excess_weight
-        Which distortion; see `nonrigid.formulations.distortion.distortion`.
     groups
         Largest number of groups peeled off in the first game.
     group_quality
         A group is kept while x'Ax / (1 - 1/m), its mean payoff, is at least this share of the first group's.
     agreement
         Mean payoff between two groups at which they may be merged.
-    local_candidates
-        Candidates of each sample in the second game; 0 for no second game.
-    local_reach
-        Distance to the nearest match, in units of sqrt(full area), up to which a sample takes part in the second game.
+    kernel_width, part_samples, full_samples, per_sample, radii, sides, excess_weight, local_candidates, local_reach
+        See `nonrigid.formulations.games.GameSettings`.
 
     Source: Rodola, Bronstein, Albarelli, Bergamasco and Torsello, a game-theoretic approach to deformable shape
     matching (CVPR 2012); SHREC'16 eqs. (9), (10). The numbers are this package's choice: the papers do not give them.
@@ -59,18 +50,9 @@ class GameTheoretic:
     0.02
     """
 
-    kernel_width: float = 0.03
-    part_samples: int = 300
-    full_samples: int = 1000
-    per_sample: int = 10
-    radii: tuple[float, ...] = (0.04, 0.10)
-    sides: Sides = "two-sided"
-    excess_weight: float = 0.3
     groups: int = 3
     group_quality: float = 0.8
     agreement: float = 0.5
-    local_candidates: int = 6
-    local_reach: float = 0.15
 
     method: ClassVar[str] = "gt"
 

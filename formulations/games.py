@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,44 +14,33 @@ from nonrigid.formulations.model import Problem, QuadraticForm, Set, Variable, m
 from nonrigid.geometry.arrays import FloatArray
 
 
-class GameSettings(Protocol):
-    """Name the hyper-parameters that such a method has; `GameTheoretic` explains them."""
+@dataclass(frozen=True, kw_only=True)
+class GameSettings:
+    """Hold the settings that methods of this kind share.
 
-    @property
-    def kernel_width(self) -> float:
-        """Distortion that halves a payoff."""
+    Parameters
+    ----------
+    kernel_width
+        Distortion at which two matches earn one half, in units of sqrt(full area).
+    part_samples, full_samples, per_sample, radii
+        Candidates of the first game; see `nonrigid.formulations.candidates.candidate_matches`.
+    sides, excess_weight
+        Which distortion; see `nonrigid.formulations.distortion.distortion`.
+    local_candidates
+        Candidates of each sample in the second game; 0 for no second game.
+    local_reach
+        Distance to the nearest match, in units of sqrt(full area), up to which a sample takes part in the second game.
+    """
 
-    @property
-    def part_samples(self) -> int:
-        """Samples of the part."""
-
-    @property
-    def full_samples(self) -> int:
-        """Samples of the full surface."""
-
-    @property
-    def per_sample(self) -> int:
-        """Candidates of each sample of the part."""
-
-    @property
-    def radii(self) -> tuple[float, ...]:
-        """Radii of the descriptors."""
-
-    @property
-    def sides(self) -> Sides:
-        """Which distortion."""
-
-    @property
-    def excess_weight(self) -> float:
-        """Weight of distances that a cut may have lengthened."""
-
-    @property
-    def local_candidates(self) -> int:
-        """Candidates of each sample in the second game."""
-
-    @property
-    def local_reach(self) -> float:
-        """Largest distance to an anchor in the second game."""
+    kernel_width: float = 0.03
+    part_samples: int = 300
+    full_samples: int = 1000
+    per_sample: int = 10
+    radii: tuple[float, ...] = (0.04, 0.10)
+    sides: Sides = "two-sided"
+    excess_weight: float = 0.3
+    local_candidates: int = 6
+    local_reach: float = 0.15
 
 
 def players(settings: GameSettings, pair: Pair) -> Candidates:
