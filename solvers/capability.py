@@ -12,7 +12,6 @@ from nonrigid.formulations.model.binary_sets import integral_entries
 from nonrigid.solvers.acceptance import Acceptance, Bridge, Native, Refused, Via, via
 from nonrigid.solvers.layout import Layout
 
-
 _MOST_ENTRIES = 10_000_000
 """Largest Jacobian of constraints, in numbers of 8 bytes: methods keep several copies."""
 

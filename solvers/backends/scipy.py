@@ -20,7 +20,7 @@ from nonrigid.solvers.backend import Raw
 from nonrigid.solvers.bridges.hull import ToHull
 from nonrigid.solvers.bridges.pair_lift import PairLift
 from nonrigid.solvers.bridges.radial import Radial
-from nonrigid.solvers.capability import Capability, accept
+from nonrigid.solvers.capability import Capability, accept, too_many_conditions
 from nonrigid.solvers.layout import FlatConstraint, Layout
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.oracle import NotFiniteError, Oracle
@@ -123,6 +123,9 @@ def _options(algorithm: str, limits: Limits) -> dict[str, Any]:
 def _nonlinear_obstacle(problem: Problem) -> str | None:
     if problem.curvature is not Curvature.AFFINE:
         return f"it takes linear objectives only, and {problem.name!r} declares none"
+    large = too_many_conditions(problem)
+    if large is not None:
+        return large
     for item in Layout(problem).constraints():
         if not item.constraint.linear:
             return f"it takes linear constraints only, and {item.name!r} is none"

@@ -22,6 +22,7 @@ from nonrigid.solvers.backends.casadi.transcription import second_order_obstacle
 from nonrigid.solvers.bridges.hull import ToHull
 from nonrigid.solvers.bridges.kkt_mixed_integer import KktMixedInteger
 from nonrigid.solvers.bridges.pair_lift import PairLift
+from nonrigid.solvers.capability import too_many_conditions
 from nonrigid.solvers.layout import Layout
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.oracle import Oracle
@@ -93,6 +94,9 @@ class Casadi:
             return Refused(
                 f"{self.algorithm}: it cannot branch, and {integral} entries are integral; use casadi:bonmin"
             )
+        large = too_many_conditions(problem)
+        if large is not None:
+            return Refused(f"{self.algorithm}: {large}")
         if self.algorithm in _SECOND_ORDER:
             obstacle = second_order_obstacle(problem, _LARGEST[self.algorithm])
             return Native() if obstacle is None else Refused(f"{self.algorithm}: {obstacle}")

@@ -12,6 +12,7 @@ from nonrigid.formulations.model import Applied, Curvature, Problem, Sense, Vari
 from nonrigid.formulations.model.binary_sets import integral_entries
 from nonrigid.geometry.arrays import BoolArray, FloatArray
 from nonrigid.solvers.backends.cvxpy.ops import CvxpyOps
+from nonrigid.solvers.capability import too_many_conditions
 from nonrigid.solvers.layout import Layout
 from nonrigid.solvers.oracle import Oracle
 
@@ -108,6 +109,9 @@ def set_obstacle(problem: Problem, *, quadratic: bool, integral: bool = False) -
 
     `quadratic` where the solver takes curved ones, `integral` where it branches.
     """
+    large = too_many_conditions(problem)
+    if large is not None:
+        return large
     for name, (_, condition) in problem.constraints.items():
         if not condition.linear:
             return f"CVXPY cannot see into the curved constraint {name!r}; use casadi:ipopt"
