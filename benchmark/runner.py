@@ -120,7 +120,8 @@ def _write_head(plan: Plan, store: Store, runs: Mapping[str, Sequence[Run]], wor
         write_text(store.folder / "plan.toml", plan.text)
         write_text(store.folder / "environment.json", json_text({**found, "jobs": workers}) + "\n")
     head = {"title": plan.title, "dataset": plan.data_word, "data": plan.dataset.name, "metric": plan.metric}
-    store.write_index({**head, "runs": labels})
+    root = getattr(plan.dataset, "root", None)
+    store.write_index({**head, "root": None if root is None else str(Path(root).resolve()), "runs": labels})
 
 
 def _hand_out(

@@ -33,6 +33,9 @@ def report_command(
         raise InputError(f"--jobs is {jobs}", remedy="give at least 1")
     store = Store(folder)
     index, records = store.index(), store.records()
+    root = index.get("root")
+    if data is None and root is not None and Path(root).exists():
+        data = Path(root)
     if figure is not None:
         out = folder / "report"
         out.mkdir(exist_ok=True)
