@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib.metadata import version
+from importlib.util import find_spec
 from typing import ClassVar
 
 from nonrigid.formulations.model import Problem
@@ -138,7 +139,8 @@ class Native:
     @classmethod
     def versions(cls) -> dict[str, str]:
         """Return the versions of what the numbers depend on."""
-        return {"nonrigid": version("nonrigid"), "numpy": version("numpy")}
+        found = {name: version(name) for name in ("nonrigid", "numpy", "scipy")}
+        return found if find_spec("ot") is None else {**found, "pot": version("pot")}
 
 
 def _search_obstacle(algorithm: str, problem: Problem) -> str | None:
