@@ -15,7 +15,7 @@ The plans of POT are read out as those of `pgw` are: each sample goes where most
 from there; samples, areas, distances and descriptors are the same too. Rows go to the file one by one, and those found
 there are not run again. Seconds are those after the geometry (eigenpairs, descriptors, distances) where that is in the
 cache, and pyFM's without its eigenpairs; with --cold nothing is cached and all is counted. Expect `pgw` and `anchored`
-below half the error of each peer.
+below half the mean error of pyFM and of POT.
 """
 
 from __future__ import annotations
