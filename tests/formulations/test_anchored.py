@@ -15,7 +15,9 @@ from nonrigid.benchmark.protocol import random_rigid_motion, score
 from nonrigid.formulations.anchored import Anchored
 from nonrigid.formulations.formulation import Correspondence, Pair
 from nonrigid.formulations.interpolation import closest_feature_points
-from nonrigid.formulations.spectral_growth import map_fit
+from nonrigid.formulations.spectral_growth import bases, map_fit
+from nonrigid.formulations.trusted_descriptors import trusted_descriptors
+from nonrigid.geometry.maps import nearest_rows
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.solvers.match import match
 from nonrigid.solvers.solve import solve
@@ -67,6 +69,16 @@ def test_points_of_the_surface_are_found_in_its_own_coordinates(creature: PairDa
     corner = full.faces[faces, 0]
     points = closest_feature_points(places, full.vertices, full, corner)
     np.testing.assert_allclose(points.positions(full), places, atol=1e-9 * np.sqrt(full.area))
+
+
+def test_all_principal_components_measure_like_the_descriptors(creature: PairData) -> None:
+    """A rotation of the descriptors' coordinates keeps their inner products, hence every nearest vertex."""
+    pair = Pair.of(creature.part, creature.full)
+    descriptors = trusted_descriptors(pair, SMALL.radii, power=1.0)
+    basis = bases(pair, descriptors, part_size=30, full_size=60, descriptor_weight=0.01, components=10**6)
+    C, points = np.eye(40, 20), np.arange(0, len(pair.part.mesh.vertices), 7)
+    whole, turned = (nearest_rows(*basis.features(C, points, principal=some)) for some in (False, True))
+    np.testing.assert_array_equal(whole[0], turned[0])
 
 
 def test_every_vertex_of_a_creature_is_matched_well(creature: PairData, matched: Correspondence) -> None:
