@@ -91,6 +91,11 @@ class Oracle:
         self.build_seconds += self.seconds
         self._started, self._paused = time.perf_counter(), 0.0
 
+    def count_as_build(self, seconds: float) -> None:
+        """Say that so much of the time since `built` was build time as well, in a backend that builds as it goes."""
+        self.build_seconds += seconds
+        self._paused += seconds
+
     def value_and_gradient(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Return the function to be minimized and its gradient at a flat point.
 

@@ -93,6 +93,7 @@ class Sifted:
         x, value = np.zeros(game.size), -np.inf
         while True:
             answer = solve_once(_small_game(game, members), inner, {"u": shares}, _left(limits, oracle, game, members))
+            oracle.count_as_build(answer.build_seconds)
             if not answer.values:
                 return Raw(x if x.any() else None, f"{answer.status.value}: {answer.message}")
             if answer.objective <= value:
