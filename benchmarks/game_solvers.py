@@ -205,7 +205,8 @@ def _draw(rows: list[Row], path: Path) -> None:
     for axis, key, label in ((axes[0], "time", "time to the target in s"), (axes[1], "peak", "peak memory in MB")):
         for spec in dict.fromkeys(row["spec"] for row in rows):
             mine = [row for row in rows if row["spec"] == spec]
-            (line,) = axis.loglog([row["n"] for row in mine], [row[key] for row in mine], "-", label=spec)
+            style = "--" if spec.startswith("sifted") else "-"
+            (line,) = axis.loglog([row["n"] for row in mine], [row[key] for row in mine], style, label=spec)
             for row in mine:
                 filled = line.get_color() if row["reached"] else "none"
                 axis.loglog(row["n"], row[key], "o", color=line.get_color(), markerfacecolor=filled)
