@@ -239,6 +239,15 @@ def children(process: int) -> list[int]:
     return found
 
 
+def busy_workers(process: subprocess.Popen[str]) -> list[int]:
+    """Return the workers of a benchmark that are at a run, waiting for one; none if it ends before."""
+    while process.poll() is None:
+        if workers := [child for child in children(process.pid) if children(child)]:
+            return workers
+        time.sleep(0.005)
+    return []
+
+
 @contextlib.contextmanager
 def small_disk(stage: Stage) -> Iterator[tuple[Path, bool]]:
     """Offer a folder on a file system of 0.5 MB where this user may mount one, else any folder."""
@@ -269,8 +278,8 @@ def disturb(stage: Stage, out: Path, mounted: bool, total: int) -> set[str]:
         limit = 9000 if not mounted and not disk_full else None
         process = stage.start(out, "events.txt", "--jobs", "2", limit=limit)
         want = min(len(before) + (1 if stage.small else stage.rng.randint(1, 6)), total)
-        if not worker_killed and disk_full and wait_runs(out, want, process):
-            workers = [child for child in children(process.pid) if children(child)]
+        if not worker_killed and (disk_full or stage.small) and wait_runs(out, want, process):
+            workers = busy_workers(process)
             if workers:
                 os.kill(stage.rng.choice(workers), signal.SIGKILL)
                 worker_killed = True
