@@ -49,12 +49,14 @@ def transport_problem(problem: Problem) -> TransportProblem | str:
 
 def network_obstacle(problem: Problem) -> str | None:
     """Return why the steps cannot be made by POT's network simplex; None if they can."""
-    if find_spec("ot") is None:
-        return "it needs POT; install nonrigid[peers], or use native:conditional_gradient"
     found = transport_problem(problem)
     if isinstance(found, str):
         return f"it needs {found}"
-    return None if isinstance(found.set, PartialTransport) else f"it needs a transport plan, not a point of {found.set}"
+    if not isinstance(found.set, PartialTransport):
+        return f"it needs a transport plan, not a point of {found.set}"
+    if find_spec("ot") is None:
+        return "it needs POT; install nonrigid[peers], or use native:conditional_gradient"
+    return None
 
 
 def conditional_gradient(oracle: Oracle, start: FloatArray, limits: Limits) -> tuple[FloatArray, str]:
