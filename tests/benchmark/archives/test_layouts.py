@@ -1,4 +1,4 @@
-"""Data sets in files are found by their layout, read alike from folders and zips; what is wrong in them is named."""
+"""Data sets in files are found by their layout, and read alike from folders and zips, whole and by folds."""
 
 from __future__ import annotations
 
@@ -15,95 +15,30 @@ import pytest
 from nonrigid.benchmark.contact_sheet import contact_sheet
 from nonrigid.benchmark.datasets.archive import Archive, open_dataset
 from nonrigid.benchmark.datasets.checks import Finding, check_archive
-from nonrigid.benchmark.datasets.convert import LAYOUTS, convert, pack
-from nonrigid.benchmark.datasets.copies import find_copies, in_own_pose, signature
+from nonrigid.benchmark.datasets.convert import LAYOUTS, convert
 from nonrigid.benchmark.datasets.folds import Fold, select_fold
 from nonrigid.benchmark.datasets.inventory import full_shape_rows, part_rows, summary_rows
-from nonrigid.benchmark.formats import write_baryc, write_vts
+from nonrigid.benchmark.formats import write_vts
 from nonrigid.benchmark.plan import read_plan
-from nonrigid.benchmark.protocol import random_rigid_motion
 from nonrigid.benchmark.render import View
 from nonrigid.geometry.errors import InputError, UnknownNameError
 from nonrigid.geometry.io import write_off
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.partial import restrict
 from nonrigid.geometry.points import SurfacePoints
-from nonrigid.geometry.remesh import decimate, isosurface
 from nonrigid.geometry.writers import write_mesh
-
-
-def lump(x: float, y: float, z: float) -> Mesh:
-    """Return a closed surface without symmetry."""
-
-    def inside(p: np.ndarray) -> np.ndarray:
-        return np.linalg.norm(p / [1.0, y, z], axis=1) - 1.0 - 0.2 * np.sin(3 * p[:, 0] + x)
-
-    return decimate(isosurface(inside, [-1.5] * 3, [1.5] * 3, 0.12), 300)
-
-
-FULLS = {"cat": lump(0.3, 0.8, 0.6), "sea-horse": lump(1.0, 0.6, 0.9)}
-"""Two classes, one with a name that no list of ours holds."""
-
-
-def build(root: Path, *, truth: bool = True, null: bool = True, seed: int = 0) -> Path:
-    """Write a set with the official layout: two splits, two classes, parts of several poses."""
-    generator = np.random.default_rng(seed)
-    poses = []
-    for class_name, full in FULLS.items():
-        (root / "null").mkdir(parents=True, exist_ok=True)
-        write_off(full, root / "null" / f"{class_name}.off")
-        for split, numbers in (("cuts", (1, 2, 10)), ("holes", (1, 2))):
-            (root / split).mkdir(exist_ok=True)
-            for number in numbers:
-                direction = generator.normal(size=3)
-                centres = full.vertices[full.faces].mean(axis=1)
-                part = restrict(full, centres @ direction > 0.1 * number / 10)
-                stem = root / split / f"{split}_{class_name}_shape_{number}"
-                pose = number % 3
-                moved = part.mesh.transformed(translation=[5.0 * pose, 0, 0])
-                write_off(moved, stem.with_suffix(".off"))
-                poses.append(f"{stem.name},{class_name}{pose}")
-                points = SurfacePoints.at_vertices(full, part.vertex_of_part)
-                if truth:
-                    write_baryc(stem.with_suffix(".baryc_gt"), points)
-                    write_baryc(stem.with_suffix(".baryc_gt_sym"), points)
-    (root / "source_poses.csv").write_text("shape,source_pose\n" + "\n".join(poses) + "\n")
-    if not null:
-        shutil.rmtree(root / "null")
-        (root / "source_poses.csv").unlink()
-    return root
-
-
-@pytest.fixture(scope="module")
-def training(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build(tmp_path_factory.mktemp("a") / "shrec2016_PartialDeformableShapes")
-
-
-@pytest.fixture(scope="module")
-def test_set(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("b") / "shrec2016_PartialDeformableShapes_TestSet"
-    return build(folder, truth=False, null=False, seed=1)
-
-
-@pytest.fixture
-def copy(training: Path, tmp_path: Path) -> Path:
-    """Return a copy of the training set, to be spoiled."""
-    return Path(shutil.copytree(training, tmp_path / "set"))
-
-
-def zipped(folder: Path, path: Path) -> Path:
-    pack(folder, path, inside=folder.name)
-    return path
 
 
 def faults(root: Path, **more: Any) -> list[Finding]:
     return [finding for finding in check_archive(Archive(root=root, **more)) if finding.kind == "fault"]
 
 
-def test_folder_and_zip_give_the_same_pairs(training: Path, tmp_path: Path) -> None:
+def test_folder_and_zip_give_the_same_pairs(
+    training: Path, tmp_path: Path, fulls: dict[str, Mesh], zipped: Callable[[Path, Path], Path]
+) -> None:
     specs = open_dataset(training).pairs()
     assert [spec.name for spec in specs[:3]] == [f"cuts_cat_shape_{number}" for number in (1, 2, 10)]
-    assert {spec.class_name for spec in specs} == set(FULLS)
+    assert {spec.class_name for spec in specs} == set(fulls)
     assert {spec.metadata["archive"] for spec in specs} == {training.name}
     assert [spec.source_pose for spec in specs[:3]] == ["cat1", "cat2", "cat1"]
     archive = zipped(training, tmp_path / "any.zip")
@@ -157,7 +92,9 @@ def test_conversion_gives_the_same_bytes_each_time(training: Path, tmp_path: Pat
         convert(open_dataset(training), tmp_path / "c", layout="posed")
 
 
-def test_a_test_set_takes_its_full_shapes_from_the_training_set(training: Path, test_set: Path, tmp_path: Path) -> None:
+def test_a_test_set_takes_its_full_shapes_from_the_training_set(
+    training: Path, test_set: Path, tmp_path: Path, zipped: Callable[[Path, Path], Path]
+) -> None:
     with pytest.raises(InputError, match=r"in no folder `null`.*give `templates`"):
         open_dataset(test_set).pairs()
     specs = open_dataset(test_set, templates=training).pairs()
@@ -172,8 +109,8 @@ def test_a_test_set_takes_its_full_shapes_from_the_training_set(training: Path, 
     assert both[0].name == f"{training.name}-cuts_cat_shape_1"
 
 
-def test_posed_classes_and_common_numbers(tmp_path: Path) -> None:
-    full = FULLS["cat"]
+def test_posed_classes_and_common_numbers(tmp_path: Path, fulls: dict[str, Mesh]) -> None:
+    full = fulls["cat"]
     order = np.random.default_rng(0).permutation(len(full.vertices))
     renumber = np.argsort(order)
     bent = Mesh(full.vertices[order] * [1, 1.2, 1], renumber[full.faces])
@@ -202,126 +139,6 @@ def test_posed_classes_and_common_numbers(tmp_path: Path) -> None:
         eleven.load()
 
 
-def test_a_sound_set_has_no_fault(training: Path, tmp_path: Path) -> None:
-    assert faults(training) == []
-    assert faults(zipped(training, tmp_path / "a.zip")) == []
-
-
-def test_missing_files_of_a_pair_are_named(copy: Path) -> None:
-    (copy / "cuts" / "cuts_cat_shape_2.baryc_gt").unlink()
-    (copy / "holes" / "holes_cat_shape_1.off").unlink()
-    (copy / "holes" / "holes_cat_shape_2.baryc_gt_sym").unlink()
-    (copy / "null" / "sea-horse.off").unlink()
-    found = {finding.place.removeprefix(str(copy)): finding.problem for finding in faults(copy)}
-    assert "the ground truth is missing" in found["/cuts/cuts_cat_shape_2.baryc_gt"]
-    assert "the mesh of this shape is missing" in found["/holes/holes_cat_shape_1.off"]
-    assert "the mirrored ground truth is missing" in found["/holes/holes_cat_shape_2.baryc_gt_sym"]
-    assert "no full shape of the class 'sea-horse'" in found["/null/sea-horse.off"]
-    with pytest.raises(InputError, match=r"cuts_cat_shape_2.baryc_gt: the ground truth is missing"):
-        open_dataset(copy).pairs()
-    assert Archive(root=copy, names=("cuts_cat_shape_1",)).pairs()[0].load().truth is not None
-
-
-def test_rows_that_do_not_fit_are_named(copy: Path) -> None:
-    path = copy / "cuts" / "cuts_cat_shape_1.baryc_gt"
-    path.write_text(path.read_text() + "1 1 0 0\n")
-    other = copy / "holes" / "holes_cat_shape_2.off"
-    other.write_text("\n".join(other.read_text().split("\n")[:50]))
-    found = faults(copy)
-    assert len(found) == 2
-    assert found[0].place == str(path)
-    assert "rows, but the part has" in found[0].problem
-    assert "training and test sets" in found[0].remedy
-    assert found[1].place == str(other)
-    assert "cut short" in found[1].problem
-
-
-def test_triangles_counted_from_zero_are_named(copy: Path) -> None:
-    for stem in ("cuts_cat_shape_1", "cuts_cat_shape_2"):
-        path = copy / "cuts" / f"{stem}.baryc_gt"
-        rows = np.loadtxt(path)
-        rows[:, 0] -= 1
-        rows[:, 0] = np.maximum(rows[:, 0], 1)  # such a file need not name triangle 0
-        rows[5, 0] = 0 if stem.endswith("1") else rows[5, 0]
-        np.savetxt(path, rows)
-    found = faults(copy)
-    assert (found[0].place, found[0].row is not None) == (str(copy / "cuts" / "cuts_cat_shape_1.baryc_gt"), True)
-    assert "looks 0-based" in found[0].problem
-    assert "counted from 0" in found[1].problem
-    assert found[1].remedy == "add 1 to every triangle"
-
-
-def test_truth_of_another_shape_is_named(copy: Path, test_set: Path) -> None:
-    path = copy / "cuts" / "cuts_cat_shape_1.baryc_gt"
-    rows = np.loadtxt(path)
-    np.savetxt(path, rows[np.random.default_rng(0).permutation(len(rows))])
-    shutil.copy(test_set / "holes" / "holes_cat_shape_1.off", copy / "holes" / "holes_cat_shape_1.off")
-    found = faults(copy)
-    assert ["as that of another shape does" in found[0].problem, "training and test" in found[0].remedy] == [True] * 2
-    assert any("holes_cat_shape_1" in finding.place and "training and test" in finding.remedy for finding in found)
-
-
-def test_swapped_folders_are_named(copy: Path) -> None:
-    (copy / "cuts").rename(copy / "kept")
-    (copy / "holes").rename(copy / "cuts")
-    (copy / "kept").rename(copy / "holes")
-    found = faults(copy)
-    assert found[0].problem == "a shape of 'holes' among those of 'cuts'"
-    with pytest.raises(InputError, match="move it to the folder it belongs to"):
-        open_dataset(copy).pairs()
-
-
-def test_damaged_zips_are_named(training: Path, tmp_path: Path) -> None:
-    archive = zipped(training, tmp_path / "a.zip")
-    whole = archive.read_bytes()
-    archive.write_bytes(whole[: len(whole) // 2])
-    with pytest.raises(InputError, match=r"a\.zip: is no zip archive, or a truncated one: .*fetch it again"):
-        open_dataset(archive).pairs()
-    with zipfile.ZipFile(zipped(training, archive)) as packed:
-        member = next(info for info in packed.infolist() if info.filename.endswith("cuts_cat_shape_1.off"))
-    spoiled = bytearray(whole)
-    spoiled[member.header_offset + 200] ^= 0xFF
-    archive.write_bytes(spoiled)
-    found = faults(archive)
-    assert [finding.place for finding in found] == [f"{archive}/{member.filename}"]
-    assert "cannot be unpacked" in found[0].problem
-    archive.unlink()
-    with pytest.raises(InputError, match="no such folder or archive"):
-        open_dataset(archive).pairs()
-
-
-def test_what_is_no_data_set_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "letter.txt").write_text("hello")
-    with pytest.raises(InputError, match="1 files, but no layout"):
-        open_dataset(tmp_path).pairs()
-    with pytest.raises(InputError, match="0 folders `null`"):
-        open_dataset(tmp_path, templates=tmp_path).pairs()
-
-
-def test_copies_are_found_through_motion_renumbering_and_jitter(training: Path) -> None:
-    generator = np.random.default_rng(0)
-    parts = [spec.load_part() for spec in open_dataset(training).pairs()]
-    known = [(str(place), signature(mesh)) for place, mesh in enumerate(parts)]
-    assert find_copies(known) == []
-    mesh = parts[3]
-    moved = random_rigid_motion(mesh)[0]
-    order = generator.permutation(len(mesh.vertices))
-    noise = 0.0005 * np.sqrt(mesh.area) * generator.normal(size=mesh.vertices.shape)
-    copied = Mesh((moved.vertices + noise)[order], np.argsort(order)[moved.faces][::-1])
-    assert find_copies([("new", signature(copied))], known) == [("3", "new")]
-    assert find_copies([*known, ("new", signature(copied))]) == [("3", "new")]
-
-
-def test_leaks_are_told_but_are_no_faults(copy: Path, training: Path) -> None:
-    full = FULLS["cat"]
-    part = restrict(full, full.vertices[full.faces][:, :, 0].min(axis=1) > 0).mesh
-    assert in_own_pose(part, full)
-    assert not in_own_pose(part.transformed(translation=[0.2, 0, 0]), full)
-    leaks = check_archive(Archive(root=copy), against=Archive(root=training))
-    assert {finding.kind for finding in leaks} == {"leak"}
-    assert sum("the same shape as" in finding.problem for finding in leaks) == 10
-
-
 def test_folds_are_by_source_pose_and_named(training: Path) -> None:
     specs = open_dataset(training).pairs()
     folds = [select_fold(specs, Fold(number=number, count=3)) for number in (1, 2, 3)]
@@ -346,11 +163,11 @@ def test_folds_need_source_poses(copy: Path) -> None:
         Archive(root=copy, fold="1/2").pairs()
 
 
-def test_inventory_counts_shapes(training: Path) -> None:
+def test_inventory_counts_shapes(training: Path, fulls: dict[str, Mesh]) -> None:
     dataset = open_dataset(training)
     rows = full_shape_rows(dataset)
     assert [(row["class"], row["vertices"], row["euler"], row["defects"]) for row in rows] == [
-        (name, len(mesh.vertices), 2, "") for name, mesh in sorted(FULLS.items())
+        (name, len(mesh.vertices), 2, "") for name, mesh in sorted(fulls.items())
     ]
     summary = summary_rows(part_rows(dataset))
     assert [(row["split"], row["class"], row["shapes"]) for row in summary][:3] == [
@@ -387,7 +204,7 @@ def test_a_contact_sheet_shows_every_class(training: Path) -> None:
 
 
 def test_a_test_set_is_matched_and_submitted(
-    training: Path, test_set: Path, tmp_path: Path, nonrigid: Callable[..., Any]
+    training: Path, test_set: Path, tmp_path: Path, nonrigid: Callable[..., Any], zipped: Callable[[Path, Path], Path]
 ) -> None:
     zipped(test_set, tmp_path / f"{test_set.name}.zip")
     shutil.copytree(training, tmp_path / "train")
