@@ -10,14 +10,12 @@ import numpy as np
 
 from nonrigid.formulations.formulation import Correspondence, Pair, Solved, Stages
 from nonrigid.formulations.games import game
-from nonrigid.formulations.interpolation import closest_feature_points
 from nonrigid.formulations.model import ElasticNet, Problem
 from nonrigid.formulations.sampled_distances import SampledDistances, sampled_distances
 from nonrigid.formulations.spectral_growth import Bases, bases, grown
 from nonrigid.formulations.trusted_descriptors import trusted_descriptors
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.errors import InputError
-from nonrigid.geometry.maps import nearest_rows
 
 KEEPING = 0.03
 """Mean change of distances, in units of sqrt(full area), at which a match has confidence 1/2."""
@@ -141,14 +139,9 @@ class Anchored:
             if best.score >= self.enough:
                 break
         best = max(best, (yield from self._grown(pair, basis, samples, best.rows, self.last_steps)))
-        C = best.C
-        queries, features = basis.features(C, slice(None))
-        nearest = nearest_rows(queries, features)[0]
-        found = closest_feature_points(queries, features, pair.full.mesh, nearest)
-        # Where the repair split a vertex in several, its first copy speaks for it.
-        raw, first = np.unique(pair.part.clean_view.raw_of_vertex, return_index=True)
+        found, nearest = basis.read_off(best.C, pair.full.mesh)
         confidence = samples.confidence(pair, np.arange(len(nearest)), nearest, width=KEEPING)
-        return Correspondence(raw, pair.full.clean_view.to_raw(found)[first], confidence[first])
+        return Correspondence.of_every_vertex(pair, found, confidence)
 
     def _anchored(self, samples: SampledDistances, start: Start) -> Generator[Problem, Solved, IntArray]:
         """Play one game, and place the samples by its winners and then by one another."""

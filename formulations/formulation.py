@@ -111,6 +111,22 @@ class Correspondence:
         raw, first = np.unique(pair.part.clean_view.raw_of_vertex[part], return_index=True)
         return cls(raw, points[first], sure[first])
 
+    @classmethod
+    def of_every_vertex(cls, pair: Pair, points: SurfacePoints, confidence: FloatArray) -> Correspondence:
+        """Return the correspondence of all vertices of the part's repaired view, in the numbers of the files.
+
+        Where the repair split a vertex in several, its first copy speaks for it.
+        """
+        raw, first = np.unique(pair.part.clean_view.raw_of_vertex, return_index=True)
+        return cls(raw, pair.full.clean_view.to_raw(points)[first], confidence[first])
+
+    def view_vertices(self, pair: Pair) -> tuple[IntArray, IntArray]:
+        """Return matched vertices of the repaired views: a point between vertices stands for its nearest corner."""
+        part = pair.part.clean_view.vertex_of_raw[self.part_vertices]
+        full = pair.full.clean_view.from_raw(self.points).nearest_corner(pair.full.mesh)
+        known = (part >= 0) & (full >= 0)
+        return part[known], full[known]
+
     def dense(self, vertex_count: int) -> SurfacePoints:
         """Return one point for each vertex of the part, unmatched where there is none: the form of a `.corr` file."""
         faces, weights = np.full(vertex_count, -1, dtype=np.int64), np.zeros((vertex_count, 3))

@@ -13,7 +13,7 @@ from nonrigid.formulations.model import Problem, Variable, minimize
 from nonrigid.formulations.model.terms.gromov_wasserstein import GromovWasserstein
 from nonrigid.formulations.model.terms.linear import Linear
 from nonrigid.formulations.model.transport_sets import PartialTransport
-from nonrigid.formulations.partial_zoomout import growth, sample_areas
+from nonrigid.formulations.partial_zoomout import GrowthSettings, growth, sample_areas
 from nonrigid.formulations.sampled_distances import SampledDistances, sampled_distances
 from nonrigid.formulations.trusted_descriptors import trusted_descriptors
 from nonrigid.geometry.arrays import FloatArray
@@ -24,7 +24,7 @@ LIKENESS = 0.05
 
 
 @dataclass(frozen=True, kw_only=True)
-class PartialGromovWasserstein:
+class PartialGromovWasserstein(GrowthSettings):
     """Match by the transport of the part's area into the full surface's that changes distances least.
 
     1. "transport": minimize sum (d_ii' - D_jj')^2 T_ij T_i'j' + look_weight * sum M_ij T_ij over plans T >= 0 between
@@ -49,7 +49,7 @@ class PartialGromovWasserstein:
         Capacity over area of the full surface's samples: 1 for none to spare, more where areas are not kept.
     radii, trust_power, fitted_samples, grid_samples, first_size, steps, descriptor_weight, components, part_size,
     full_size
-        See `nonrigid.formulations.partial_zoomout.PartialZoomOut`.
+        See `nonrigid.formulations.partial_zoomout.GrowthSettings`.
 
     Source: Chapel, Alaya and Gasso, partial optimal transport with applications on positive-unlabeled learning (NeurIPS
     2020); the term for looks, Vayer, Chapel, Flamary, Tavenard and Courty, fused Gromov-Wasserstein (ICML 2019). The
@@ -67,16 +67,6 @@ class PartialGromovWasserstein:
     look_weights: tuple[float, ...] = (0.3, 0.1, 0.03)
     even_start: bool = True
     room: float = 1.0
-    radii: tuple[float, ...] = (0.04, 0.10)
-    trust_power: float = 1.0
-    fitted_samples: int = 1000
-    grid_samples: int = 1500
-    first_size: int = 20
-    steps: int = 20
-    descriptor_weight: float = 0.004
-    components: int = 80
-    part_size: int = 100
-    full_size: int = 200
 
     method: ClassVar[str] = "pgw"
 

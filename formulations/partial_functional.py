@@ -116,7 +116,7 @@ class PartialFunctionalMap:
         bases = Bases.of(pair, self.eigenfunctions, self.closest_point_samples)
         if self.start == "anchors":
             anchors = yield from GameTheoretic().stages(pair)
-            descriptors = self._near(pair, *_vertices(pair, anchors))
+            descriptors = self._near(pair, *anchors.view_vertices(pair))
         else:
             descriptors = describe(pair.part, self.radii), describe(pair.full, self.radii)
         joint = self.joint(pair, bases, descriptors)
@@ -264,11 +264,3 @@ class _State:
     energy: float = np.inf
     mapped: bool = False
     ended: bool = False
-
-
-def _vertices(pair: Pair, matches: Correspondence) -> tuple[IntArray, IntArray]:
-    """Return the vertices of the repaired views that a sparse correspondence between vertices names."""
-    part = pair.part.clean_view.vertex_of_raw[matches.part_vertices]
-    full = pair.full.clean_view.from_raw(matches.points).nearest_corner(pair.full.mesh)
-    known = (part >= 0) & (full >= 0)
-    return part[known], full[known]

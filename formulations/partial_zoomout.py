@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
-from typing import ClassVar, Literal, Protocol, TypeAlias
+from typing import ClassVar, Literal, TypeAlias
 
 import numpy as np
 
 from nonrigid.formulations.elastic_net import ElasticNetMatching
 from nonrigid.formulations.formulation import Correspondence, Pair, Solved, Stages
 from nonrigid.formulations.game_theoretic import GameTheoretic
-from nonrigid.formulations.interpolation import closest_feature_points
 from nonrigid.formulations.model import Problem
 from nonrigid.formulations.spectral_growth import Bases, bases, grown, map_fit
 from nonrigid.formulations.trusted_descriptors import TrustedDescriptors, trusted_descriptors
@@ -28,7 +27,40 @@ KEEPING = 0.03
 
 
 @dataclass(frozen=True, kw_only=True)
-class PartialZoomOut:
+class GrowthSettings:
+    """Hold the settings of maps that grow from matches, which methods share.
+
+    Parameters
+    ----------
+    radii, trust_power
+        SHOT descriptors; see `nonrigid.formulations.anchored.Anchored`.
+    fitted_samples, grid_samples
+        Samples of the part to which maps are fitted, and of the full surface among which coarse maps find images.
+    first_size, steps
+        Eigenfunctions of the part in the first map, and number of maps that follow.
+    descriptor_weight
+        Squared length, in units of the full area, that a squared difference 1 of unit descriptors is worth beside
+        eigenfunctions; 0 as published.
+    components
+        Principal components of the descriptors that stand beside eigenfunctions while maps grow; in the end, all.
+    part_size, full_size
+        Largest numbers of eigenfunctions.
+    """
+
+    radii: tuple[float, ...] = (0.04, 0.10)
+    trust_power: float = 1.0
+    fitted_samples: int = 1000
+    grid_samples: int = 1500
+    first_size: int = 20
+    steps: int = 20
+    descriptor_weight: float = 0.004
+    components: int = 80
+    part_size: int = 100
+    full_size: int = 200
+
+
+@dataclass(frozen=True, kw_only=True)
+class PartialZoomOut(GrowthSettings):
     """Match every vertex of the part by functional maps of growing size, begun with the matches of another method.
 
     1. The start: the problems of game-theoretic or elastic-net matching, or none where each sample begins at the vertex
@@ -41,21 +73,11 @@ class PartialZoomOut:
     ----------
     start
         Whose matches are grown: "gt", "en" or "descriptors".
-    radii, trust_power
-        SHOT descriptors; see `nonrigid.formulations.anchored.Anchored`.
     part_samples, full_samples
         Samples of the start.
-    fitted_samples, grid_samples
-        Samples of the part to which maps are fitted, and of the full surface among which coarse maps find images.
-    first_size, steps
-        Eigenfunctions of the part in the first map, and number of maps that follow.
-    descriptor_weight
-        Squared length, in units of the full area, that a squared difference 1 of unit descriptors is worth beside
-        eigenfunctions; 0 as published.
-    components
-        Principal components of the descriptors that stand beside eigenfunctions while maps grow; in the end, all.
-    part_size, full_size
-        Largest numbers of eigenfunctions.
+    radii, trust_power, fitted_samples, grid_samples, first_size, steps, descriptor_weight, components, part_size,
+    full_size
+        See `GrowthSettings`.
 
     Source: Melzi, Ren, Rodola, Sharma, Wonka and Ovsjanikov, ZoomOut (SIGGRAPH Asia 2019), whose section on partial
     matching grows both sizes at the rate of the part's share of the spectrum. Orthonormal columns, descriptors, the
@@ -68,18 +90,9 @@ class PartialZoomOut:
     """
 
     start: From = "gt"
-    radii: tuple[float, ...] = (0.04, 0.10)
-    trust_power: float = 1.0
     part_samples: int = 300
     full_samples: int = 1000
-    fitted_samples: int = 1000
-    grid_samples: int = 1500
     first_size: int = 12
-    steps: int = 20
-    descriptor_weight: float = 0.004
-    components: int = 80
-    part_size: int = 100
-    full_size: int = 200
 
     method: ClassVar[str] = "zoomout"
 
@@ -100,43 +113,7 @@ class PartialZoomOut:
             return points, grid[descriptors.differences(points, grid).argmin(axis=1)]
         kind = GameTheoretic if self.start == "gt" else ElasticNetMatching
         method = kind(part_samples=self.part_samples, full_samples=self.full_samples, radii=self.radii)
-        return in_views(pair, (yield from method.stages(pair)))
-
-
-class GrowthSettings(Protocol):
-    """Name the hyper-parameters of growing maps; `PartialZoomOut` explains them."""
-
-    @property
-    def fitted_samples(self) -> int:
-        """Samples of the part."""
-
-    @property
-    def grid_samples(self) -> int:
-        """Samples of the full surface."""
-
-    @property
-    def first_size(self) -> int:
-        """Eigenfunctions of the part in the first map."""
-
-    @property
-    def steps(self) -> int:
-        """Number of maps that follow."""
-
-    @property
-    def descriptor_weight(self) -> float:
-        """Weight of descriptors."""
-
-    @property
-    def components(self) -> int:
-        """Principal components of descriptors."""
-
-    @property
-    def part_size(self) -> int:
-        """Largest number of the part's eigenfunctions."""
-
-    @property
-    def full_size(self) -> int:
-        """Largest number of the full surface's eigenfunctions."""
+        return (yield from method.stages(pair)).view_vertices(pair)
 
 
 def growth(
@@ -168,15 +145,11 @@ def growth(
     queries, features = basis.features(C, points, principal=True)
     images = grid[nearest_rows(queries, features[grid])[0]]
     C, _ = yield from grown(basis, points, images, sizes, grid=grid)
-    queries, features = basis.features(C, slice(None))
-    nearest = nearest_rows(queries, features)[0]
-    found = closest_feature_points(queries, features, pair.full.mesh, nearest)
+    found, nearest = basis.read_off(C, pair.full.mesh)
     # Weyl's law: features of k eigenfunctions are about sqrt(pi) k times as far apart as the points (area 1).
     apart = np.linalg.norm(basis.part[:, : C.shape[1]] @ C.T - basis.full[nearest, : len(C)], axis=1)
     length = apart / (np.sqrt(np.pi) * len(C))
-    raw, first = np.unique(pair.part.clean_view.raw_of_vertex, return_index=True)
-    confidence = np.exp(-np.log(2.0) * np.square(length / KEEPING))
-    return Correspondence(raw, pair.full.clean_view.to_raw(found)[first], confidence[first])
+    return Correspondence.of_every_vertex(pair, found, np.exp(-np.log(2.0) * np.square(length / KEEPING)))
 
 
 def first_map(basis: Bases, part: IntArray, full: IntArray, weight: FloatArray, size: int) -> Problem:
@@ -193,12 +166,3 @@ def sample_areas(surface: Surface, samples: IntArray) -> FloatArray:
     """Return (s,) the area of the vertices to which each sample is the nearest, in units of the full area."""
     nearest = surface.distances(samples).argmin(axis=0)
     return np.asarray(np.bincount(nearest, weights=surface.laplacian().mass, minlength=len(samples)), dtype=float)
-
-
-def in_views(pair: Pair, matches: Correspondence) -> tuple[IntArray, IntArray]:
-    """Return matched vertices of the repaired views: a point between vertices stands for its nearest corner."""
-    view = np.full(len(pair.part.raw.vertices), -1, dtype=np.int64)
-    raw = pair.part.clean_view.raw_of_vertex
-    view[raw[::-1]] = np.arange(len(raw))[::-1]
-    full = pair.full.clean_view.from_raw(matches.points)
-    return view[matches.part_vertices], full.nearest_corner(pair.full.mesh)

@@ -9,12 +9,15 @@ import numpy as np
 
 from nonrigid.formulations.formulation import Pair, Solved
 from nonrigid.formulations.functional_maps import estimated_rank
+from nonrigid.formulations.interpolation import closest_feature_points
 from nonrigid.formulations.model import Problem, Variable, maximize
 from nonrigid.formulations.model.stiefel import Stiefel
 from nonrigid.formulations.model.terms.linear import Linear
 from nonrigid.formulations.trusted_descriptors import TrustedDescriptors
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.maps import nearest_rows
+from nonrigid.geometry.mesh import Mesh
+from nonrigid.geometry.points import SurfacePoints
 
 RANK_AT = 100
 """Number of eigenvalues of the full surface by which the part's share of the spectrum is estimated."""
@@ -73,6 +76,17 @@ class Bases:
         weight = np.pi * size**2 * self.descriptor_weight
         queries = np.hstack([self.part[points, : C.shape[1]] @ C.T, weight * looks])
         return queries, np.hstack([self.full[:, :size], others])
+
+    def read_off(self, C: FloatArray, full: Mesh) -> tuple[SurfacePoints, IntArray]:
+        """Return, for every vertex of the part, the point of the full surface with the nearest features.
+
+        Returns
+        -------
+        The points, in the triangles around the (n,) vertices with the nearest features, and these.
+        """
+        queries, features = self.features(C, slice(None))
+        nearest = nearest_rows(queries, features)[0]
+        return closest_feature_points(queries, features, full, nearest), nearest
 
 
 def bases(

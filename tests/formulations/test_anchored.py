@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.stats import ortho_group
 
-from nonrigid.benchmark.datasets.creatures import Creatures
 from nonrigid.benchmark.datasets.protocols import PairData
 from nonrigid.benchmark.datasets.shrec16 import Shrec16
 from nonrigid.benchmark.protocol import random_rigid_motion, score
@@ -26,12 +25,6 @@ SMALL = Anchored(
     radii=(0.08, 0.15), part_samples=200, full_samples=700, fitted_samples=400, part_size=60, full_size=120, starts=2
 )
 """Settings for meshes of 1,500 vertices, in whose triangles small SHOT balls find too few neighbours."""
-
-
-@pytest.fixture(scope="module")
-def creature() -> PairData:
-    specs = Creatures(vertices=1500).pairs()
-    return next(spec for spec in specs if spec.split == "cuts").load()
 
 
 def found(data: PairData, part: Mesh, full: Mesh, method: Anchored = SMALL) -> Correspondence:

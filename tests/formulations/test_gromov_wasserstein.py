@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nonrigid.benchmark.datasets.creatures import Creatures
 from nonrigid.benchmark.datasets.protocols import PairData
 from nonrigid.benchmark.datasets.shrec16 import Shrec16
 from nonrigid.benchmark.protocol import random_rigid_motion, score
@@ -20,11 +19,6 @@ from nonrigid.solvers.match import Match, match
 SMALL = PartialGromovWasserstein(
     radii=(0.08, 0.15), part_samples=80, full_samples=160, fitted_samples=400, steps=6, part_size=60, full_size=120
 )
-
-
-@pytest.fixture(scope="module")
-def creature() -> PairData:
-    return next(spec for spec in Creatures(vertices=1500).pairs() if spec.split == "cuts").load()
 
 
 @pytest.fixture(scope="module")

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from nonrigid.benchmark.datasets.creatures import Creatures
 from nonrigid.benchmark.datasets.protocols import PairData
 from nonrigid.benchmark.protocol import random_rigid_motion, score
 from nonrigid.formulations.formulation import Correspondence, Pair
 from nonrigid.formulations.model.stiefel import Stiefel
-from nonrigid.formulations.partial_zoomout import PartialZoomOut, first_map, in_views, sample_areas
+from nonrigid.formulations.partial_zoomout import PartialZoomOut, first_map, sample_areas
 from nonrigid.formulations.spectral_growth import bases
 from nonrigid.formulations.trusted_descriptors import trusted_descriptors
 from nonrigid.geometry.errors import InputError, UnknownNameError
@@ -20,11 +19,6 @@ from nonrigid.solvers.solve import solve
 SMALL = PartialZoomOut(
     radii=(0.08, 0.15), part_samples=120, full_samples=500, fitted_samples=400, steps=6, part_size=60, full_size=120
 )
-
-
-@pytest.fixture(scope="module")
-def creature() -> PairData:
-    return next(spec for spec in Creatures(vertices=1500).pairs() if spec.split == "cuts").load()
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +66,7 @@ def test_the_areas_around_samples_are_the_surface(pair: Pair) -> None:
 
 def test_matches_come_back_in_the_numbers_of_the_views(pair: Pair) -> None:
     part, full = pair.part.samples(20), pair.full.samples(20)
-    again = in_views(pair, Correspondence.between_vertices(pair, part, full))
+    again = Correspondence.between_vertices(pair, part, full).view_vertices(pair)
     order = np.argsort(part)
     np.testing.assert_array_equal(again[0], part[order])
     np.testing.assert_array_equal(again[1], full[order])

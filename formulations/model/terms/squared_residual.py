@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from nonrigid.formulations.model.term import Applicable, Curvature, ModelError
+from nonrigid.formulations.model.term import Applicable, Curvature
+from nonrigid.formulations.model.terms.residual import check_residual, lowered_residual
 from nonrigid.geometry.arrays import FloatArray
 
 
@@ -41,11 +42,7 @@ class SquaredResidual(Applicable):
     curvature: Curvature = Curvature.CONVEX
 
     def __post_init__(self) -> None:
-        shapes = self.source.shape, self.target.shape
-        if self.source.ndim != 2 or self.target.ndim != 2 or shapes[0][1] != shapes[1][1]:
-            raise ModelError(f"A and B have shapes {shapes[0]} and {shapes[1]}; give (r, q) and (k, q)")
-        if not (np.isfinite(self.source).all() and np.isfinite(self.target).all()):
-            raise ModelError("A or B has entries that are not finite")
+        check_residual(self.source, self.target)
 
     def value_and_gradient(self, *x: FloatArray) -> tuple[float, FloatArray]:
         """Return the sum of squares and its gradient, (k, r)."""
@@ -58,7 +55,7 @@ class SquaredResidual(Applicable):
 
     def lower(self, x: Any, ops: Any) -> Any:
         """Write the sum in the operations of a symbolic backend."""
-        return ops.sum_squares(ops.matmul(self.source.T, x.T).T - self.target)
+        return ops.sum_squares(lowered_residual(self.source, self.target, x, ops))
 
     def latex(self, names: Sequence[str]) -> str:
         """Return the sum as LaTeX."""
