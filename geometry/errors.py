@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from difflib import get_close_matches
 from os import PathLike
+
+_SHOWN = 40  # names that a message may list
 
 
 class NonrigidError(Exception):
@@ -49,12 +52,24 @@ class InputError(NonrigidError, ValueError):
 
 
 class UnknownNameError(NonrigidError, KeyError):
-    """Report a name (method, backend, algorithm, option) that does not exist, with the names that do."""
+    """Report a name (method, backend, algorithm, option) that does not exist, with the names that do.
+
+    Of more than 40 names those that read most like it are shown, and how many there are.
+
+    Examples
+    --------
+    >>> print(UnknownNameError("backend", "nlop", ["native", "nlopt"]))
+    unknown backend 'nlop'; choose one of: native, nlopt
+    """
 
     def __init__(self, kind: str, name: str, known: object) -> None:
         self.kind, self.name = kind, name
-        choices = ", ".join(sorted(str(choice) for choice in known)) if hasattr(known, "__iter__") else str(known)
-        self.text = f"unknown {kind} {name!r}; choose one of: {choices}"
+        choices = sorted(str(choice) for choice in known) if hasattr(known, "__iter__") else [str(known)]
+        if len(choices) > _SHOWN:
+            near = get_close_matches(name, choices, n=5, cutoff=0.0)
+            self.text = f"unknown {kind} {name!r}; choose one of {len(choices)}, such as {', '.join(near)}"
+        else:
+            self.text = f"unknown {kind} {name!r}; choose one of: {', '.join(choices)}"
         super().__init__(self.text)
 
     def __str__(self) -> str:

@@ -27,13 +27,13 @@ def canonical_frame(mesh: Mesh) -> tuple[FloatArray, FloatArray]:
     >>> bool(np.allclose((wedge.vertices - c) @ axes, (turned.vertices - d) @ others))
     True
     """
-    weights = mesh.vertex_areas / mesh.area
+    scale, weights = np.sqrt(mesh.area) or 1.0, mesh.vertex_areas / (mesh.area or 1.0)
     centroid = weights @ mesh.vertices
-    offsets = mesh.vertices - centroid
+    offsets = (mesh.vertices - centroid) / scale
     axes = np.linalg.eigh((offsets * weights[:, None]).T @ offsets)[1][:, ::-1]
     coordinates = offsets @ axes
     moments = weights @ coordinates**3
-    skewness = np.abs(moments) / np.maximum(weights @ coordinates**2, 1e-300) ** 1.5
+    skewness = np.abs(moments) / np.maximum(weights @ coordinates**2, 1e-30) ** 1.5
     signs = np.where(moments < 0, -1.0, 1.0)
     weakest = int(np.argmin(skewness))
     signs[weakest] = 1.0

@@ -10,6 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.errors import InputError, UnknownNameError
+from nonrigid.geometry.frame import canonical_frame
 from nonrigid.geometry.geodesics.dijkstra import virtual_edge_graph
 from nonrigid.geometry.mesh import Mesh
 
@@ -81,9 +82,8 @@ def farthest_points(
 def canonical_priority(mesh: Mesh) -> FloatArray:
     """Rank the vertices by a generic linear functional in a frame the shape carries with it.
 
-    The frame has its origin at the area-weighted centroid and the area-weighted principal axes, each pointing the way
-    its third moment is positive, except the axis of the smallest skewness, which makes the frame right-handed. Values
-    are divided by sqrt(area): they are the same, up to rounding, after rigid motion, scaling and re-ordering.
+    The frame is `nonrigid.geometry.frame.canonical_frame`. Values are divided by sqrt(area): they are the same, up to
+    rounding, after rigid motion, scaling and re-ordering.
 
     Returns
     -------
@@ -96,18 +96,8 @@ def canonical_priority(mesh: Mesh) -> FloatArray:
     >>> bool(np.allclose(canonical_priority(strip), canonical_priority(strip.transformed(scale=3.0))))
     True
     """
-    scale = np.sqrt(mesh.area) or 1.0
-    weights = mesh.vertex_areas / (mesh.area or 1.0)
-    offsets = (mesh.vertices - weights @ mesh.vertices) / scale
-    axes = np.linalg.eigh((offsets * weights[:, None]).T @ offsets)[1][:, ::-1]
-    coordinates = offsets @ axes
-    moments = weights @ coordinates**3
-    spread = np.sqrt(np.maximum(weights @ coordinates**2, 1e-30))
-    weakest = int(np.argmin(np.abs(moments) / spread**3))
-    signs = np.where(moments < 0, -1.0, 1.0)
-    signs[weakest] = 1.0
-    signs[weakest] = np.sign(np.linalg.det(axes * signs))
-    return np.asarray(coordinates @ (signs * FUNCTIONAL))
+    centroid, axes = canonical_frame(mesh)
+    return np.asarray((mesh.vertices - centroid) @ (axes @ FUNCTIONAL) / (np.sqrt(mesh.area) or 1.0))
 
 
 def _farthest(distances: FloatArray, priority: FloatArray) -> int:

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from nonrigid.geometry.errors import InputError
+from nonrigid.geometry.errors import InputError, UnknownNameError
 from nonrigid.geometry.io import read_mesh, write_off
 from nonrigid.geometry.mesh import Mesh
 
@@ -125,3 +125,10 @@ def test_real_templates_have_the_documented_sizes(data: Path) -> None:
     for name, size in sizes.items():
         mesh = read_mesh(data / "shrec16" / "null" / f"{name}.off")
         assert (len(mesh.vertices), len(mesh.faces)) == size
+
+
+def test_of_many_names_the_nearest_are_shown() -> None:
+    names = [f"cuts_{kind}_shape_{number}" for kind in ("cat", "dog") for number in range(30)]
+    message = str(UnknownNameError("pair", "cuts_cat_shape_77", names))
+    assert "choose one of 60, such as cuts_cat_shape_" in message
+    assert message.count("shape") <= 6
