@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar
 
 import numpy as np
 
-from nonrigid.formulations.model import ElasticNet, Problem, QuadraticForm, Variable, maximize
+from nonrigid.formulations.model import ElasticNet, Problem, QuadraticForm, Sense, Variable, maximize
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.solvers.acceptance import Acceptance, Native, Refused
-from nonrigid.solvers.backend import Raw, backend_class, make_backend
+from nonrigid.solvers.backend import Backend, Raw, backend_class, make_backend
 from nonrigid.solvers.backends.native.payoff import Payoff
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.once import solve_once
 from nonrigid.solvers.oracle import Oracle
+from nonrigid.solvers.solution import Solution, TracePoint
 from nonrigid.solvers.structure import QuadraticGame, quadratic_game
 
 _PLAYED = 1e-9  # shares below this one are an interior point's way of writing 0
@@ -92,8 +94,7 @@ class Sifted:
         members, shares = self._first(game, payoff, start, oracle)
         x, value = np.zeros(game.size), -np.inf
         while True:
-            answer = solve_once(_small_game(game, members), inner, {"u": shares}, _left(limits, oracle, game, members))
-            oracle.count_as_build(answer.build_seconds)
+            answer = _solved(game, members, shares, inner, oracle, _left(limits, oracle, game, members))
             if not answer.values:
                 return Raw(x if x.any() else None, f"{answer.status.value}: {answer.message}")
             if answer.objective <= value:
@@ -143,6 +144,34 @@ def _small_game(game: QuadraticGame, members: IntArray) -> Problem:
     u = Variable("u", len(members))
     objective = maximize(game.weight * QuadraticForm(matrix)(u))
     return Problem(f"game of {len(members)} of {game.size} strategies", objective, u @ game.surface)
+
+
+def _solved(
+    game: QuadraticGame, members: IntArray, shares: FloatArray, inner: Backend, oracle: Oracle, limits: Limits
+) -> Solution:
+    """Solve a small game; show its better points to the oracle, and charge it the inner solver's own time alone."""
+    objective = oracle.problem.objective
+    sign = 1.0 if objective.sense is Sense.MAXIMIZE else -1.0
+    begun, apart = time.perf_counter(), 0.0
+
+    def settle(solving: float) -> None:
+        nonlocal apart
+        spent = time.perf_counter() - begun - solving
+        oracle.count_as_build(spent - apart)
+        apart = spent
+
+    def show(point: FloatArray, trace: TracePoint) -> None:
+        nonlocal apart
+        settle(trace.seconds)
+        before = time.perf_counter()
+        x = np.zeros(game.size)
+        x[members] = point
+        oracle.observe(x, objective=objective.constant + sign * trace.objective)
+        apart += time.perf_counter() - before  # the oracle leaves this out by itself
+
+    answer = solve_once(_small_game(game, members), inner, {"u": shares}, limits, show)
+    settle(answer.solve_seconds)
+    return answer
 
 
 def _largest(g: FloatArray, count: int) -> IntArray:
