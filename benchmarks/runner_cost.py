@@ -18,7 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
-import chaos
+import chaos_trial
 import numpy as np
 
 
@@ -29,15 +29,15 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=0.5)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        stage = chaos.Stage(Path(folder), True, random.Random(0))
-        chaos.prepare(stage)
+        stage = chaos_trial.Stage(Path(folder), True, random.Random(0))
+        chaos_trial.prepare(stage)
         environment = stage.environment("events.txt")
         os.environ.update(environment)
         sys.path.insert(0, str(stage.folder / "site"))
         measure(stage, options.runs, options.seconds)
 
 
-def measure(stage: chaos.Stage, count: int, seconds: float) -> None:
+def measure(stage: chaos_trial.Stage, count: int, seconds: float) -> None:
     """Time direct calls, one worker and two workers."""
     from nonrigid.benchmark.executors import make_executor
     from nonrigid.benchmark.plan import read_plan
@@ -47,7 +47,7 @@ def measure(stage: chaos.Stage, count: int, seconds: float) -> None:
     from nonrigid.solvers.match import match
 
     def plan(pause: float) -> Path:
-        text = chaos.PLAN.format(run_seconds=60, splits='["cuts"]')
+        text = chaos_trial.PLAN.format(run_seconds=60, splits='["cuts"]')
         for number in range(count):
             text += f'[[methods]]\nmethod = "trial"\nlabel = "t{number}"\n'
             text += f"settings = {{ number = {number}, seconds = {pause} }}\n"

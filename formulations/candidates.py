@@ -69,6 +69,18 @@ def describe(surface: Surface, radii: tuple[float, ...]) -> FloatArray:
     return np.asarray(np.divide(rows, length, out=np.zeros_like(rows), where=length > 0))
 
 
+def principal_axes(rows: FloatArray, count: int) -> FloatArray:
+    """Return the `count` orthonormal directions along which rows (n, d) have the largest second moment, (d, count).
+
+    Examples
+    --------
+    >>> np.abs(principal_axes(np.array([[3.0, 0.0], [0.0, 1.0]]), 1))
+    array([[1.],
+           [0.]])
+    """
+    return np.asarray(np.linalg.eigh(rows.T @ rows)[1][:, ::-1][:, :count])
+
+
 def candidate_matches(
     pair: Pair,
     *,

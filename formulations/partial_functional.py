@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from nonrigid.formulations.candidates import describe
+from nonrigid.formulations.candidates import describe, principal_axes
 from nonrigid.formulations.formulation import Correspondence, Pair, Solved, Stages
 from nonrigid.formulations.functional_maps import (
     diagonal_start,
@@ -69,6 +69,8 @@ class PartialFunctionalMap:
         Radii of the SHOT descriptors that starts are made from, in units of sqrt(full area).
     start_samples
         Number of samples of the part whose nearest descriptors make a start.
+    components
+        Principal components of the descriptors that the energy sees, as far as there are more; starts see all of them.
     mask_weight, orthogonality_weight, area_weight, edge_weight
         Weights for a full surface of area 1. The published ones, 1, 1e3, 1 and 1e2, hold for an area of about 1.75e4:
         lengths there are 132 times longer, and the terms change as its powers 0, 0, 4 and 1, the data as its power 1.
@@ -96,6 +98,7 @@ class PartialFunctionalMap:
     start: Start = "several"
     start_radii: tuple[float, ...] = (0.04, 0.10)
     start_samples: int = 1000
+    components: int = 80
     mask_weight: float = 7.6e-3
     orthogonality_weight: float = 7.6
     area_weight: float = 2.3e6
@@ -141,10 +144,12 @@ class PartialFunctionalMap:
     def joint(self, pair: Pair, bases: Bases, descriptors: tuple[FloatArray, FloatArray]) -> Problem:
         """Return the problem in C and v for descriptors (n, q) of the part and of the whole."""
         C, v = Variable("C", (bases.size, bases.size)), Variable("v", len(bases.full.mass))
-        whole = MaskedBasis(bases.full.eigenfunctions, bases.full.mass, descriptors[1], np.float32)
+        axes = principal_axes(descriptors[1], self.components)
+        kept = descriptors[1] @ axes
+        whole = MaskedBasis(bases.full.eigenfunctions, bases.full.mass, kept, np.float32, mixing=axes)
         mesh = pair.full.mesh
         energy = (
-            MaskedData(bases.part.project(descriptors[0]), whole)(C, v)
+            MaskedData(bases.part.project(descriptors[0] @ axes) @ axes.T, whole)(C, v)
             + self.mask_weight * WeightedSquares(slanted_mask(bases.size, bases.rank))(C)
             + self.area_weight * AreaGap(bases.full.mass, float(bases.part.mass.sum()))(v)
             + self.edge_weight * MumfordShah(mesh.vertices, mesh.faces)(v)
@@ -157,7 +162,7 @@ class PartialFunctionalMap:
     def _check(self) -> None:
         if self.start not in _STARTS:
             raise UnknownNameError("start", self.start, _STARTS)
-        for name in ("eigenfunctions", "rounds", "closest_point_samples", "start_samples"):
+        for name in ("eigenfunctions", "rounds", "closest_point_samples", "start_samples", "components"):
             if getattr(self, name) < 1:
                 raise InputError(f"{name} is {getattr(self, name)}", remedy="give a number of at least 1")
         if self.start in ("several", "descriptors") and not self.start_radii:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from nonrigid.formulations.candidates import principal_axes
 from nonrigid.formulations.formulation import Pair, Solved
 from nonrigid.formulations.functional_maps import estimated_rank
 from nonrigid.formulations.interpolation import closest_feature_points
@@ -108,7 +109,7 @@ def bases(
     reference = min(RANK_AT, len(full.eigenvalues))
     rank = estimated_rank(part.eigenvalues, full.eigenvalues[:reference])
     targets = descriptors.targets()
-    axes = np.linalg.eigh(targets.T @ targets)[1][:, ::-1][:, :components]
+    axes = principal_axes(targets, components)
     return Bases(
         part=part.eigenfunctions,
         full=full.eigenfunctions,

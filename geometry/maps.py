@@ -64,7 +64,7 @@ def nearest_rows(
 
     # Products of centred rows of length at most one neither overflow nor cancel more than they must.
     centre = targets.mean(axis=0)
-    size = max(float(np.abs(targets - centre).max(initial=0.0)), float(np.abs(queries - centre).max(initial=0.0)))
+    size = max(_largest_offset(targets, centre), _largest_offset(queries, centre))
     unit = 1.0 / size if size > 0.0 else 1.0
     right = (targets - centre) * unit
     half_norms = (0.5 * np.square(right).sum(axis=1)).astype(kind)
@@ -76,9 +76,11 @@ def nearest_rows(
     for start in range(0, len(queries), block):
         rows = slice(start, start + block)
         left = (queries[rows] - centre) * unit
-        scores = half_norms - left.astype(kind) @ right_t
+        scores = left.astype(kind) @ right_t
+        np.subtract(half_norms, scores, out=scores)
         slack = 2.0 * _rounding(np.linalg.norm(left, axis=1), reach, queries.shape[1], kind)
-        query, target = np.nonzero(scores <= _limits(scores, count, slack)[:, None])
+        near = scores <= _limits(scores, count, slack)[:, None]
+        query, target = np.divmod(np.flatnonzero(near), near.shape[1])  # far faster than nonzero in 2D
         indices[rows], squared[rows] = _ranked(query, target, queries[rows], targets, count)
     return (indices[:, 0], squared[:, 0]) if count == 1 else (indices, squared)
 
@@ -91,6 +93,12 @@ def _checked(rows: FloatArray, name: str) -> FloatArray:
     if len(bad):
         raise InputError(f"{len(bad)} {name} are not finite, the first is row {bad[0]} (0-based)", remedy="drop them")
     return array
+
+
+def _largest_offset(rows: FloatArray, centre: FloatArray) -> float:
+    if not rows.size:
+        return 0.0
+    return float(max((rows.max(axis=0) - centre).max(), (centre - rows.min(axis=0)).max()))
 
 
 def _rounding(lengths: FloatArray, reach: float, dimension: int, kind: np.dtype[np.floating]) -> FloatArray:

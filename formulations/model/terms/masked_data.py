@@ -25,10 +25,12 @@ class MaskedBasis:
     mass
         (n,) areas of the vertices.
     functions
-        G, (n, q).
+        G, (n, q); with `mixing` its factor X, (n, r).
     dtype
-        Precision of the two matrix products, each n k q multiplications: float32 halves the time, and gradients keep
-        six digits.
+        Precision of the two matrix products, each n k q multiplications, n k r with `mixing`: float32 halves the time,
+        and gradients keep six digits.
+    mixing
+        Y, (q, r), where G = X Y': functions of low rank, as descriptors in their principal components.
 
     Examples
     --------
@@ -38,25 +40,37 @@ class MaskedBasis:
     """
 
     def __init__(
-        self, basis: FloatArray, mass: FloatArray, functions: FloatArray, dtype: DTypeLike = np.float64
+        self,
+        basis: FloatArray,
+        mass: FloatArray,
+        functions: FloatArray,
+        dtype: DTypeLike = np.float64,
+        mixing: FloatArray | None = None,
     ) -> None:
         if len({len(basis), len(mass), len(functions)}) > 1:
             lengths = len(basis), len(mass), len(functions)
             raise ModelError(f"basis, mass and functions have {lengths} rows; give one a vertex")
-        if not all(np.isfinite(array).all() for array in (basis, mass, functions)):
-            raise ModelError("the basis, the mass or the functions have entries that are not finite")
+        if mixing is not None and (mixing.ndim != 2 or mixing.shape[1] != functions.shape[1]):
+            raise ModelError(f"mixing has shape {mixing.shape}; give it {functions.shape[1]} columns")
+        given = (basis, mass, functions) if mixing is None else (basis, mass, functions, mixing)
+        if not all(np.isfinite(array).all() for array in given):
+            raise ModelError("the basis, the mass, the functions or their mixing have entries that are not finite")
         self._weighted: Any = np.ascontiguousarray(basis * mass[:, None], dtype=dtype)
         self._functions: Any = np.ascontiguousarray(functions, dtype=dtype)
-        self.size, self.rank, self.count = len(basis), basis.shape[1], functions.shape[1]
+        self._mixing = mixing
+        self.size, self.rank = len(basis), basis.shape[1]
+        self.count = functions.shape[1] if mixing is None else len(mixing)
 
     def project(self, u: FloatArray) -> FloatArray:
         """Return B(u), (k, q), in double precision."""
         scaled = self._weighted * u.astype(self._weighted.dtype)[:, None]
-        return np.asarray(scaled.T @ self._functions, dtype=float)
+        found = np.asarray(scaled.T @ self._functions, dtype=float)
+        return found if self._mixing is None else found @ self._mixing.T
 
     def adjoint(self, weights: FloatArray) -> FloatArray:
         """Return the gradient of <weights, B(u)> in u, (n,), for weights (k, q)."""
-        products = self._functions @ weights.T.astype(self._functions.dtype)
+        onto = weights if self._mixing is None else weights @ self._mixing
+        products = self._functions @ onto.T.astype(self._functions.dtype)
         return np.asarray(np.einsum("nk,nk->n", products, self._weighted), dtype=float)
 
 

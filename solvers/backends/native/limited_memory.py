@@ -17,6 +17,9 @@ _MEMORY = 20  # pairs kept, as many as the other backends' methods of this kind 
 _DECREASE, _CURVATURE = 1e-4, 0.9
 _TRIALS = 25
 
+_Pair = tuple[FloatArray, FloatArray, float]
+"""A step, the change of the gradient along it, and their product."""
+
 
 def limited_memory(oracle: Oracle, start: FloatArray, limits: Limits) -> tuple[FloatArray, str]:
     """Step along the quasi-Newton direction of the entries that no bound holds, by a strong Wolfe line search.
@@ -29,7 +32,7 @@ def limited_memory(oracle: Oracle, start: FloatArray, limits: Limits) -> tuple[F
     lower, upper = oracle.lower, oracle.upper
     x = np.clip(start, lower, upper)
     f, g = oracle.value_and_gradient(x)
-    pairs: deque[tuple[FloatArray, FloatArray]] = deque(maxlen=_MEMORY)
+    pairs: deque[_Pair] = deque(maxlen=_MEMORY)
     while True:
         if np.max(np.abs(np.clip(x - g, lower, upper) - x), initial=0.0) <= 0.1 * limits.tolerance * max(1.0, abs(f)):
             return x, "gradient below tolerance"
@@ -47,24 +50,25 @@ def limited_memory(oracle: Oracle, start: FloatArray, limits: Limits) -> tuple[F
             pairs.clear()  # the curvature gathered misleads: begin anew from the gradient
             continue
         step, change = found.x - x, found.gradient - g
-        if step @ change > 1e-10 * np.linalg.norm(step) * np.linalg.norm(change):
-            pairs.append((step, change))
+        curvature = float(step @ change)
+        if curvature > 1e-10 * np.linalg.norm(step) * np.linalg.norm(change):
+            pairs.append((step, change, curvature))
         x, f, g = found.x, found.value, found.gradient
 
 
-def _quasi_newton(gradient: FloatArray, pairs: deque[tuple[FloatArray, FloatArray]]) -> FloatArray:
-    """Return -H g for the inverse Hessian that the pairs (step, change of gradient) imply: the two-loop recursion."""
+def _quasi_newton(gradient: FloatArray, pairs: deque[_Pair]) -> FloatArray:
+    """Return -H g for the inverse Hessian that the pairs imply: the two-loop recursion."""
     direction = -gradient
     shares = []
-    for step, change in reversed(pairs):
-        share = (step @ direction) / (step @ change)
+    for step, change, curvature in reversed(pairs):
+        share = (step @ direction) / curvature
         daxpy(change, direction, a=-share)  # in place
         shares.append(share)
     if pairs:
-        step, change = pairs[-1]
-        direction *= (step @ change) / (change @ change)
-    for (step, change), share in zip(pairs, reversed(shares), strict=True):
-        daxpy(step, direction, a=share - (change @ direction) / (step @ change))
+        _, change, curvature = pairs[-1]
+        direction *= curvature / (change @ change)
+    for (step, change, curvature), share in zip(pairs, reversed(shares), strict=True):
+        daxpy(step, direction, a=share - (change @ direction) / curvature)
     return direction
 
 
