@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from nonrigid.benchmark.formats import write_text
-from nonrigid.benchmark.tables import SCHEMA_VERSION, check_schema, migrated, write_tables
+from nonrigid.benchmark.schema import SCHEMA_VERSION, check_schema, migrated
 from nonrigid.benchmark.terminal import json_text
 from nonrigid.geometry.errors import InputError, NonrigidError
 
@@ -138,6 +138,8 @@ class Store:
 
     def write_table(self, records: list[Record]) -> Path:
         """Write the parquet tables, each whole or not at all, and return the path of runs.parquet."""
+        from nonrigid.benchmark.tables import write_tables  # pyarrow makes every fork of a run dearer
+
         environments = {path.stem: _read(path) for path in _listed(self.environments)}
         with self.writing():
             return write_tables(self.folder, records, environments)

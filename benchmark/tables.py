@@ -12,10 +12,8 @@ from typing import Any
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from nonrigid.benchmark.schema import ADDED, SCHEMA_VERSION, check_schema
 from nonrigid.geometry.errors import InputError
-
-SCHEMA_VERSION = 2
-"""Raised with every change of the columns; 2 added accuracy, accepted, total_seconds, peak_memory, environment."""
 
 _TEXT, _REAL, _WHOLE = pa.string(), pa.float64(), pa.int64()
 _MARK = b"nonrigid_schema"
@@ -51,34 +49,6 @@ TRACES: Mapping[str, pa.DataType] = {
 ENVIRONMENTS: Mapping[str, pa.DataType] = dict.fromkeys(("environment", "name", "value"), _TEXT)
 """Columns of environment.parquet: a row a fact of a machine that runs were made on, such as packages.numpy."""
 
-_ADDED: Mapping[int, tuple[str, ...]] = {2: ("accuracy", "accepted", "total_seconds", "peak_memory", "environment")}
-
-
-def migrated(record: dict[str, Any]) -> dict[str, Any]:
-    """Return a run's record as this version writes it: what an older one did not measure is None.
-
-    Raises `InputError` for a record of a newer schema.
-
-    Examples
-    --------
-    >>> migrated({"schema": 1, "id": "a"})["accepted"] is None
-    True
-    """
-    version = check_schema(record.get("schema"))
-    for step in range(version + 1, SCHEMA_VERSION + 1):
-        record = {**dict.fromkeys(_ADDED[step]), **record}
-    return {**record, "schema": SCHEMA_VERSION}
-
-
-def check_schema(found: object) -> int:
-    """Return a schema's version; raise `InputError` where this version of the package cannot read it."""
-    if not isinstance(found, int) or not 1 <= found <= SCHEMA_VERSION:
-        raise InputError(
-            f"schema {found}, but this version reads 1 to {SCHEMA_VERSION}",
-            remedy="use the version of nonrigid that wrote it",
-        )
-    return found
-
 
 def read_table(path: Path) -> pa.Table:
     """Read a table of runs that this or an older version wrote, with the columns of this one.
@@ -98,7 +68,7 @@ def read_table(path: Path) -> pa.Table:
     except InputError as error:
         raise error.at(path) from None
     for step in range(version + 1, SCHEMA_VERSION + 1):
-        for name in _ADDED[step]:
+        for name in ADDED[step]:
             table = table.append_column(name, pa.nulls(len(table), COLUMNS[name]))
     return table.replace_schema_metadata({_MARK: str(SCHEMA_VERSION).encode()})
 

@@ -18,8 +18,9 @@ import tempfile
 import time
 from pathlib import Path
 
-import chaos_trial
+import chaos
 import numpy as np
+from chaos_trial import PLAN, write_trial
 
 
 def main() -> None:
@@ -29,15 +30,15 @@ def main() -> None:
     parser.add_argument("--seconds", type=float, default=0.5)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
-        stage = chaos_trial.Stage(Path(folder), True, random.Random(0))
-        chaos_trial.prepare(stage)
+        stage = chaos.Stage(Path(folder), True, random.Random(0))
+        write_trial(stage.folder, stage.rng, small=True)
         environment = stage.environment("events.txt")
         os.environ.update(environment)
         sys.path.insert(0, str(stage.folder / "site"))
         measure(stage, options.runs, options.seconds)
 
 
-def measure(stage: chaos_trial.Stage, count: int, seconds: float) -> None:
+def measure(stage: chaos.Stage, count: int, seconds: float) -> None:
     """Time direct calls, one worker and two workers."""
     from nonrigid.benchmark.executors import make_executor
     from nonrigid.benchmark.plan import read_plan
@@ -47,7 +48,7 @@ def measure(stage: chaos_trial.Stage, count: int, seconds: float) -> None:
     from nonrigid.solvers.match import match
 
     def plan(pause: float) -> Path:
-        text = chaos_trial.PLAN.format(run_seconds=60, splits='["cuts"]')
+        text = PLAN.format(run_seconds=60, splits='["cuts"]')
         for number in range(count):
             text += f'[[methods]]\nmethod = "trial"\nlabel = "t{number}"\n'
             text += f"settings = {{ number = {number}, seconds = {pause} }}\n"

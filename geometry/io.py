@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import trimesh
 
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.errors import InputError
@@ -216,6 +215,8 @@ def _read_obj(path: Path) -> tuple[FloatArray, IntArray]:
 
 
 def _read_ply(path: Path) -> tuple[FloatArray, IntArray]:
+    import trimesh  # a second to load, and few read PLY
+
     header = path.read_bytes()[:65536].partition(b"end_header")[0].decode("ascii", errors="replace")
     if not header.startswith("ply"):
         raise InputError(f"this is no PLY file: it starts with {header[:20]!r}", row=1, remedy="export it as PLY")

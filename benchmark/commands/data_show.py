@@ -8,9 +8,7 @@ from typing import Annotated
 
 import typer
 
-from nonrigid.benchmark.contact_sheet import contact_sheet
 from nonrigid.benchmark.datasets.archive import open_dataset
-from nonrigid.benchmark.render import View, save_png
 from nonrigid.benchmark.terminal import say, show_json
 
 
@@ -34,6 +32,10 @@ def show_command(
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Draw every full shape and its parts; colours follow the ground truth from the full shape to the part."""
+    # Drawing takes a second to load, which other commands need not wait for.
+    from nonrigid.benchmark.contact_sheet import contact_sheet
+    from nonrigid.benchmark.render import View, save_png
+
     dataset = open_dataset(root, templates=templates)
     view = View(up=up.value, azimuth=azimuth)
     image, shown = contact_sheet(dataset, splits=tuple(split or ()), view=view, size=size, per_class=per_class)

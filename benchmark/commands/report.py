@@ -10,7 +10,6 @@ import typer
 
 from nonrigid.benchmark.commands.summary import show_summary
 from nonrigid.benchmark.report.table import notes, summary
-from nonrigid.benchmark.report.write import draw_figures, pair_specs, write_report
 from nonrigid.benchmark.store import Store
 from nonrigid.benchmark.terminal import say, show_json
 from nonrigid.geometry.errors import InputError
@@ -29,6 +28,9 @@ def report_command(
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Print solver against accuracy, and write DIR/report: an overview, a page a pair, figures and tables."""
+    # Drawing takes a second to load, which other commands need not wait for.
+    from nonrigid.benchmark.report.write import draw_figures, pair_specs, write_report
+
     if jobs < 1:
         raise InputError(f"--jobs is {jobs}", remedy="give at least 1")
     store = Store(folder)

@@ -10,7 +10,6 @@ import typer
 
 from nonrigid.benchmark.datasets.protocols import PairData
 from nonrigid.benchmark.formats import read_truth
-from nonrigid.benchmark.report.single import match_score, write_match_page, write_match_picture
 from nonrigid.benchmark.terminal import say
 from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.io import read_mesh
@@ -33,6 +32,9 @@ def view_command(
     open_page: Annotated[bool, typer.Option("--open", help="Open it in the browser.")] = False,
 ) -> None:
     """Write a page, one file, that shows both surfaces in 3D with the match between them, or a picture of it."""
+    # Drawing takes a second to load, which other commands need not wait for.
+    from nonrigid.benchmark.report.single import match_score, write_match_page, write_match_picture
+
     place = out or correspondence.with_suffix(".html")
     if place.suffix not in (".html", ".png"):
         raise InputError(f"the suffix {place.suffix!r}", file=place, remedy="name a .html or .png file")

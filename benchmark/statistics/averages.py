@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import spearmanr
 
 from nonrigid.geometry.arrays import BoolArray
 from nonrigid.geometry.errors import InputError
@@ -55,6 +54,8 @@ def rank_correlation(x: ArrayLike, y: ArrayLike) -> float | None:
     a, b = a[both], b[both]
     if len(a) < 3 or np.ptp(a) == 0 or np.ptp(b) == 0:
         return None
+    from scipy.stats import spearmanr  # takes a second to load; no run needs it
+
     return round(float(spearmanr(a, b).statistic), 12)
 
 

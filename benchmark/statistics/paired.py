@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import bootstrap
 
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.geometry.errors import InputError
@@ -80,6 +79,8 @@ def _interval(difference: FloatArray, level: float, resamples: int, seed: int) -
     if np.ptp(difference) <= 1e-12 * max(1.0, float(np.abs(difference).max())):
         return float(difference[0]), float(difference[0])
     generator = np.random.default_rng(seed)
+    from scipy.stats import bootstrap  # takes a second to load; no run needs it
+
     found = bootstrap(
         (difference,), np.mean, confidence_level=level, n_resamples=resamples, method="BCa", rng=generator
     ).confidence_interval

@@ -22,8 +22,9 @@ from nonrigid.benchmark.report.table import refusals, summary
 from nonrigid.benchmark.report.write import write_report
 from nonrigid.benchmark.run import do_run, problem_hash
 from nonrigid.benchmark.runner import plan_runs, run_plan
+from nonrigid.benchmark.schema import SCHEMA_VERSION
 from nonrigid.benchmark.store import Store, with_gaps
-from nonrigid.benchmark.tables import COLUMNS, SCHEMA_VERSION
+from nonrigid.benchmark.tables import COLUMNS
 from nonrigid.formulations.formulation import Pair, Stages
 from nonrigid.formulations.model import Problem, QuadraticForm, Simplex, Variable, maximize
 from nonrigid.geometry.errors import InputError

@@ -12,8 +12,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from nonrigid.benchmark.merge import merge_results
+from nonrigid.benchmark.schema import SCHEMA_VERSION
 from nonrigid.benchmark.store import Store
-from nonrigid.benchmark.tables import COLUMNS, ENVIRONMENTS, SCHEMA_VERSION, TRACES, read_table, write_tables
+from nonrigid.benchmark.tables import COLUMNS, ENVIRONMENTS, TRACES, read_table, write_tables
 from nonrigid.geometry.errors import InputError
 
 
