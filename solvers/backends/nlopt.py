@@ -16,6 +16,7 @@ from nonrigid.solvers.acceptance import Acceptance, Bridge, Refused
 from nonrigid.solvers.backend import Raw
 from nonrigid.solvers.bridges.body import ToBody
 from nonrigid.solvers.bridges.hull import ToHull
+from nonrigid.solvers.bridges.polar import Polar
 from nonrigid.solvers.bridges.radial import Radial
 from nonrigid.solvers.bridges.squares import Squares
 from nonrigid.solvers.capability import Capability, accept
@@ -56,9 +57,9 @@ _BRIDGES: dict[str, tuple[tuple[Bridge, ...], ...]] = {
     "radial": ((Radial(),),),
     "squares": ((Squares(),),),
 }
-_AUTO: tuple[tuple[Bridge, ...], ...] = ((), (Radial(),), (ToBody(),), (ToHull(),))
+_AUTO: tuple[tuple[Bridge, ...], ...] = ((), (Radial(),), (ToBody(),), (ToHull(),), (Polar(),))
 # Methods that gather curvature lose it at every bound that becomes active, of which there are n at a sparse answer.
-_AUTO_FREE: tuple[tuple[Bridge, ...], ...] = ((), (Squares(),), (ToHull(),))
+_AUTO_FREE: tuple[tuple[Bridge, ...], ...] = ((), (Squares(),), (ToHull(),), (Polar(),))
 _FREE = ("LD_LBFGS", "LD_VAR1", "LD_VAR2", "LD_TNEWTON")
 _MEMORY = 20  # pairs of a limited-memory method; NLopt's own choice, 1.3 million numbers, makes their use the main cost
 

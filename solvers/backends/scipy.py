@@ -15,10 +15,11 @@ from scipy.sparse import csr_array
 from nonrigid.formulations.model import Curvature, Problem
 from nonrigid.formulations.model.binary_sets import integral_entries
 from nonrigid.geometry.arrays import FloatArray
-from nonrigid.solvers.acceptance import Acceptance, Native, Refused, Via
+from nonrigid.solvers.acceptance import Acceptance, Bridge, Native, Refused, Via
 from nonrigid.solvers.backend import Raw
 from nonrigid.solvers.bridges.hull import ToHull
 from nonrigid.solvers.bridges.pair_lift import PairLift
+from nonrigid.solvers.bridges.polar import Polar
 from nonrigid.solvers.bridges.radial import Radial
 from nonrigid.solvers.capability import Capability, accept, too_many_conditions
 from nonrigid.solvers.layout import FlatConstraint, Layout
@@ -40,6 +41,7 @@ _CAPABILITIES = {
         because="trust-constr factorises a dense system of all bounds a step, 0.1 s at n = 200",
     ),
 }
+_ROUTES: tuple[tuple[Bridge, ...], ...] = ((), (Radial(),), (ToHull(),), (Polar(),))
 _UNBOUNDED = 10**9  # SciPy's own limits on iterations are lifted: the oracle keeps the limits
 
 
@@ -50,8 +52,9 @@ class Scipy:
     Parameters
     ----------
     algorithm
-        "L-BFGS-B" (bounds only; surfaces by rays), "SLSQP" or "trust-constr" (with products of the Hessian where every
-        term offers them); "milp" (HiGHS, for linear objectives and constraints, integral entries or not).
+        "L-BFGS-B" (bounds only; surfaces by rays, matrices with orthonormal columns by polar factors), "SLSQP" or
+        "trust-constr" (with products of the Hessian where every term offers them); "milp" (HiGHS, for linear objectives
+        and constraints, integral entries or not).
 
     Examples
     --------
@@ -76,7 +79,7 @@ class Scipy:
             if obstacle is not None:
                 return Refused(f"milp: {obstacle}")
             return Via((PairLift(),)) if lifted else Native()
-        return accept(problem, self.algorithm, _CAPABILITIES[self.algorithm], [(), (Radial(),), (ToHull(),)])
+        return accept(problem, self.algorithm, _CAPABILITIES[self.algorithm], _ROUTES)
 
     def run(self, oracle: Oracle, start: FloatArray, limits: Limits) -> Raw:
         """Run the algorithm; a limit leaves it as an exception, and the oracle has kept the best point."""

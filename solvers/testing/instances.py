@@ -28,6 +28,7 @@ from nonrigid.formulations.model import (
     minimize,
 )
 from nonrigid.formulations.model.assignment_sets import Assignment, PartialPermutation
+from nonrigid.formulations.model.stiefel import Stiefel
 from nonrigid.formulations.model.terms.area_gap import AreaGap
 from nonrigid.formulations.model.terms.gram_penalty import GramPenalty
 from nonrigid.formulations.model.terms.group_norm import GroupNorm21
@@ -321,6 +322,23 @@ def spectral_low_pass() -> Instance:
     )
 
 
+def orthogonal_fit() -> Instance:
+    """Return max <K, C> over C'C = I: at most the sum of K's singular values, attained at its polar factor.
+
+    K = U S V' with known factors; <K, C> = <S, U'C V>, and no entry of U'C V exceeds 1.
+    """
+    rng = np.random.default_rng(6)
+    left, right = np.linalg.qr(rng.standard_normal((5, 3)))[0], np.linalg.qr(rng.standard_normal((3, 3)))[0]
+    values = np.array([2.0, 1.0, 0.5])
+    unknown = Variable("C", (5, 3))
+    return Instance(
+        problem=Problem("orthogonal fit", maximize(Linear((left * values) @ right.T)(unknown)), unknown @ Stiefel()),
+        optimum=float(values.sum()),
+        values={"C": left @ right.T},
+        certificate="sum of singular values",
+    )
+
+
 class SquaredGap(Applicable):
     """Evaluate |x - y|^2 in two arguments."""
 
@@ -348,6 +366,7 @@ _MAKERS: tuple[Callable[[], Instance], ...] = (
     injective_map,
     transport,
     spectral_low_pass,
+    orthogonal_fit,
     robust_regression,
     functional_map,
     region,

@@ -22,6 +22,7 @@ from nonrigid.solvers.backends.casadi.transcription import second_order_obstacle
 from nonrigid.solvers.bridges.hull import ToHull
 from nonrigid.solvers.bridges.kkt_mixed_integer import KktMixedInteger
 from nonrigid.solvers.bridges.pair_lift import PairLift
+from nonrigid.solvers.bridges.polar import Polar
 from nonrigid.solvers.capability import too_many_conditions
 from nonrigid.solvers.layout import Layout
 from nonrigid.solvers.limits import Limits
@@ -82,6 +83,9 @@ class Casadi:
                 return self._through(problem, PairLift())
             if self.algorithm != "bonmin":
                 return self._through(problem, ToHull())
+        if self.algorithm == "ipopt" and Polar().obstacle(problem) is None:
+            # As equations they are r (r + 1) / 2 dense rows, that are factorised in each step.
+            return self._through(problem, Polar())
         return self._takes(problem)
 
     def _through(self, problem: Problem, bridge: Bridge) -> Acceptance:

@@ -11,6 +11,7 @@ import cvxpy
 
 from nonrigid.formulations.model import Curvature, Problem
 from nonrigid.formulations.model.binary_sets import integral_entries
+from nonrigid.formulations.model.stiefel import Stiefel
 from nonrigid.formulations.model.terms.group_norm import GroupNorm21
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.acceptance import Acceptance, Native, Refused, Via, via
@@ -22,12 +23,15 @@ from nonrigid.solvers.bridges.body import ToBody
 from nonrigid.solvers.bridges.cells import RegionCells
 from nonrigid.solvers.bridges.hull import ToHull
 from nonrigid.solvers.bridges.pair_lift import PairLift
+from nonrigid.solvers.bridges.spectral_ball import ToSpectralBall
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.oracle import Oracle
 
 cp: Any = cvxpy  # its types are incomplete
 
 _LARGEST_NONLINEAR = 1000
+# Order of a cone of matrices: 7 s for one solve of CLARABEL at 90, in O(n^6), and 10 s of SCS at 300, in O(n^3) a step.
+_LARGEST_CONE = {"CLARABEL": 90, "SCS": 400}
 _PACKAGES = {"CLARABEL": "clarabel", "SCS": "scs", "OSQP": "osqp", "PIQP": "piqp", "HIGHS": "highspy"}
 
 
@@ -37,8 +41,9 @@ class Cvxpy:
 
     A problem that declares itself convex, and that CVXPY verifies to be so from the formulas of its terms, is solved
     once; any other by a sequence of convex models (`nonrigid.solvers.backends.cvxpy.successive`). The region of a
-    partial functional map, one unknown a vertex, is held constant on cells (`nonrigid.solvers.bridges.cells`). The
-    algorithms nlp-UNO and nlp-IPOPT hand the formulas to CVXPY's nonlinear mode.
+    partial functional map, one unknown a vertex, is held constant on cells (`nonrigid.solvers.bridges.cells`); matrices
+    with orthonormal columns range over their convex hull (`nonrigid.solvers.bridges.spectral_ball`). The algorithms
+    nlp-UNO and nlp-IPOPT hand the formulas to CVXPY's nonlinear mode.
 
     Parameters
     ----------
@@ -74,6 +79,9 @@ class Cvxpy:
                 return Via((ToHull(),))
         if RegionCells().obstacle(problem) is None:
             return Via((RegionCells(),))
+        if ToSpectralBall().obstacle(problem) is None:
+            obstacle = self._too_large_a_cone(problem)
+            return Via((ToSpectralBall(),)) if obstacle is None else Refused(f"{self.algorithm}: {obstacle}")
         obstacle = set_obstacle(problem, quadratic=self.algorithm in CONIC, integral=branches)
         if obstacle is not None:
             return Refused(f"{self.algorithm}: {obstacle}")
@@ -120,6 +128,17 @@ class Cvxpy:
         solver = self.algorithm.removeprefix("nlp-")
         options = nonlinear_options(self.algorithm, limits)
         return _answer(solve_quietly(program, nlp=True, solver=solver, **options), lowered, oracle)
+
+    def _too_large_a_cone(self, problem: Problem) -> str | None:
+        """Return why a solver cannot take matrices without a singular value above 1, a cone of their rows + columns."""
+        if self.algorithm not in _LARGEST_CONE:
+            return "it takes no cone of matrices, the hull of C'C = I; use SCS or CLARABEL"
+        order = max(sum(m.variable.shape) for m in problem.memberships if isinstance(m.set, Stiefel))
+        if order <= _LARGEST_CONE[self.algorithm]:
+            return None
+        return f"it needs a cone of matrices of order {order}, at most {_LARGEST_CONE[self.algorithm]} work" + (
+            "; use SCS" if self.algorithm == "CLARABEL" else "; ask for fewer eigenfunctions"
+        )
 
     def _accepts_nonlinear(self, problem: Problem) -> Acceptance:
         solver = self.algorithm.removeprefix("nlp-")

@@ -44,6 +44,10 @@ class CvxpyOps:
         """Return the Euclidean norm of each column, one second-order cone each."""
         return cp.norm(value, 2, axis=0)
 
+    def largest_singular_value(self, value: Any) -> Any:
+        """Return the largest singular value, a cone of matrices of order rows + columns."""
+        return cp.sigma_max(value)
+
     def equal(self, left: Any, right: Any) -> Any:
         """State left = right."""
         return left == right
