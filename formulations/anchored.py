@@ -67,8 +67,8 @@ class Anchored:
     fitted_samples
         Samples of the part to which functional maps are fitted.
     first_size, steps, last_steps
-        Eigenfunctions of the part in the first map, number of maps of each start, and of the best one once more: slower
-        growth is mostly, but not always, better; the mean confidence decides.
+        Eigenfunctions of the part in the first map, number of maps of each start, and of the best one once more, 0 for
+        not once more: slower growth is mostly, but not always, better; the mean confidence decides.
     components
         Principal components of the descriptors that stand beside eigenfunctions while maps grow; in the end, all.
     starts, enough
@@ -76,6 +76,8 @@ class Anchored:
         confidence wins.
     part_size, full_size
         Largest numbers of eigenfunctions.
+    between_vertices
+        Whether a match may lie inside a triangle of the full surface; else it is the best vertex.
 
     Examples
     --------
@@ -106,16 +108,17 @@ class Anchored:
     enough: float = 0.85
     part_size: int = 100
     full_size: int = 200
+    between_vertices: bool = True
 
     method: ClassVar[str] = "anchored"
 
     def stages(self, pair: Pair) -> Stages:
         """State the game, then one map a step; return one point a vertex of the part."""
-        bounds = (("steps", 1000), ("last_steps", 1000), ("starts", len(STARTS)))
-        for name, most in bounds:
+        bounds = (("steps", 1, 1000), ("last_steps", 0, 1000), ("starts", 1, len(STARTS)))
+        for name, least, most in bounds:
             value = getattr(self, name)
-            if not 1 <= value <= most:
-                raise InputError(f"{name} is {value}", remedy=f"give a number from 1 to {most}")
+            if not least <= value <= most:
+                raise InputError(f"{name} is {value}", remedy=f"give a number from {least} to {most}")
         descriptors = trusted_descriptors(pair, self.radii, power=self.trust_power)
         samples = sampled_distances(
             pair,
@@ -138,9 +141,12 @@ class Anchored:
             best = max(best, (yield from self._grown(pair, basis, samples, rows, self.steps)))
             if best.score >= self.enough:
                 break
-        best = max(best, (yield from self._grown(pair, basis, samples, best.rows, self.last_steps)))
+        if self.last_steps:
+            best = max(best, (yield from self._grown(pair, basis, samples, best.rows, self.last_steps)))
         found, nearest = basis.read_off(best.C, pair.full.mesh)
         confidence = samples.confidence(pair, np.arange(len(nearest)), nearest, width=KEEPING)
+        if not self.between_vertices:
+            return Correspondence.between_vertices(pair, np.arange(len(nearest)), nearest, confidence)
         return Correspondence.of_every_vertex(pair, found, confidence)
 
     def _anchored(self, samples: SampledDistances, start: Start) -> Generator[Problem, Solved, IntArray]:

@@ -38,6 +38,12 @@ def test_shipped_plans_are_sound() -> None:
     assert {word.partition(":")[0] for word in demo.backends} == {"native", "nlopt", "casadi", "cvxpy", "scipy"}
     assert len(demo.backends) >= 8
     assert len(read_plan("gt16").names) == 16
+    ablation = read_plan("ablation")
+    assert ablation.names == read_plan("gt16").names
+    assert len({entry.formulation for entry in ablation.methods}) == len(ablation.methods) >= 10
+    families = {"native", "nlopt", "casadi", "cvxpy", "scipy"}
+    backends = read_plan("anchored_backends").backends
+    assert {word.partition(":")[0] for word in backends if "=" not in word} == families
 
 
 @pytest.mark.realdata

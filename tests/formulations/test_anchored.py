@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from nonrigid.formulations.formulation import Correspondence, Pair
 from nonrigid.formulations.interpolation import closest_feature_points
 from nonrigid.formulations.spectral_growth import bases, map_fit
 from nonrigid.formulations.trusted_descriptors import trusted_descriptors
+from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.maps import nearest_rows
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.solvers.match import match
@@ -105,3 +107,18 @@ def test_a_real_cut_is_matched_at_every_vertex(data: Path) -> None:
     result = score(pair, matched.dense(len(pair.part.vertices)))
     assert result.unmatched_count == 0
     assert result.mean_error < 0.02
+
+
+def test_matches_can_be_kept_to_vertices_and_the_slow_growth_be_left_out(creature: PairData) -> None:
+    part = random_rigid_motion(creature.part)[0]
+    small = replace(SMALL, starts=1, steps=2, last_steps=0, between_vertices=False)
+    result = match(Pair.of(part, creature.full), small)
+    assert [solution.problem for solution in result.solutions] == ["game", "map", "map"]
+    assert result.correspondence is not None
+    assert (result.correspondence.points.barycentric.max(axis=1) == 1.0).all()
+
+
+@pytest.mark.parametrize("settings", [{"steps": 0}, {"starts": 5}, {"last_steps": -1}])
+def test_numbers_out_of_range_are_refused(creature: PairData, settings: dict[str, int]) -> None:
+    with pytest.raises(InputError, match=f"{next(iter(settings))} is .*give a number from"):
+        match(Pair.of(creature.part, creature.full), replace(SMALL, **settings))  # type: ignore[arg-type]
