@@ -9,6 +9,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import TypeAlias
 
@@ -128,10 +129,22 @@ def local_file(source: FileSource) -> Iterator[Path]:
 
 
 def load_mesh(source: FileSource) -> Mesh:
-    """Read a mesh from a file or from a member of an archive; raise `InputError` as `read_mesh` does."""
+    """Read a mesh from a file or from a member of an archive; raise `InputError` as `read_mesh` does.
+
+    The last files are remembered as long as they do not change: the parts of one class share their full shape, and what
+    has been derived from it.
+    """
+    if isinstance(source, Path) and source.is_file():
+        now = source.stat()
+        return _remembered(source, (now.st_dev, now.st_ino, now.st_mtime_ns, now.st_size))
     with local_file(source) as path:
         mesh = read_mesh(path)
     return mesh if path == source else Mesh(mesh.vertices, mesh.faces, name=mesh.name, file=str(source))
+
+
+@lru_cache(maxsize=4)
+def _remembered(path: Path, identity: tuple[int, ...]) -> Mesh:
+    return read_mesh(path)
 
 
 def exists(source: FileSource) -> bool:
