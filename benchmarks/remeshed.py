@@ -43,6 +43,7 @@ from nonrigid.geometry.arrays import FloatArray
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.points import SurfacePoints
 from nonrigid.geometry.remesh import closest_points
+from nonrigid.geometry.surface import Surface
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.match import match
 
@@ -69,8 +70,9 @@ def carried(points: SurfacePoints, original: Mesh, truth: SurfacePoints, full: M
     return SurfacePoints(faces, weights)
 
 
-def remeshed_pair(data: PairData, vertices: int) -> tuple[PairData, FloatArray]:
+def remeshed_pair(raw: PairData, vertices: int) -> tuple[PairData, FloatArray]:
     """Return the pair on its new meshes, and the errors of the carried truth on a round trip, in sqrt(full area)."""
+    data = _repaired(raw)
     assert data.truth is not None
     rate = vertices / len(data.full.vertices)
     full = remeshed(data.full, vertices, seed_of("remeshed full", data.full.name, vertices))
@@ -86,6 +88,14 @@ def remeshed_pair(data: PairData, vertices: int) -> tuple[PairData, FloatArray]:
     again = carried(there, part, truth, full, data.full).positions(data.full)
     apart = np.linalg.norm(again - data.truth.positions(data.full), axis=1)[near] / np.sqrt(data.full.area)
     return new, apart[np.isfinite(apart)]
+
+
+def _repaired(data: PairData) -> PairData:
+    """Return the pair on its repaired part: collapses need surfaces without two fans of triangles at one vertex."""
+    view = Surface(data.part, cache=None).clean_view
+    rows = view.raw_of_vertex
+    truth, mirrored = (None if of is None else of[rows] for of in (data.truth, data.mirrored))
+    return PairData(name=data.name, part=view.mesh, full=data.full, truth=truth, mirrored=mirrored)
 
 
 def run(root: Path, name: str, method: str, vertices: int | None) -> Row:
