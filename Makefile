@@ -3,13 +3,14 @@
 # make test     every test
 # make browser  look at the demo's report in a headless Chromium (installed, or named in NONRIGID_BROWSER)
 # make check    lint, format, types, layers
+# make docs     run the tutorial, draw its figures, build the site into site/
 
 PYTHON ?= python3
 BIN := .venv/bin
 export OMP_NUM_THREADS := 1
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: all demo test browser check clean
+.PHONY: all demo test browser check docs clean
 
 all: .venv/ready
 
@@ -38,5 +39,14 @@ check: .venv/ready
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+.venv/docs: .venv/ready
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[docs]'
+	touch $@
+
+docs: .venv/docs
+	$(BIN)/python docs/run_tutorial.py
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
+	@echo "Site: $(CURDIR)/site/index.html"
+
 clean:
-	rm -rf .venv .types build dist *.egg-info demo-results .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
+	rm -rf .venv .types build dist site docs/generated *.egg-info demo-results .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache
