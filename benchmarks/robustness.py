@@ -214,7 +214,7 @@ def grouped(
 
 
 def draw(rows: dict[tuple[Case, str], Row], options: argparse.Namespace, path: Path) -> None:
-    """Draw a panel a thing varied: the median of the creatures as a line, each of them as a dot."""
+    """Draw a panel a thing varied: the median as a line, each creature as a dot, a cross on top where some failed."""
     figure = Figure(figsize=(9.0, 6.4), layout="constrained")
     found = list(grouped(rows, options))
     for axes, panel in zip(figure.subplots(2, 2).ravel(), options.panels, strict=False):
@@ -228,6 +228,8 @@ def draw(rows: dict[tuple[Case, str], Row], options: argparse.Namespace, path: P
             )
             for value, errors in known:
                 axes.plot([value] * len(errors), errors, ".", color=colour, alpha=0.35, ms=5, mew=0)
+            lost = [value for value, of in mine if any(row["error"] is None for row in of)]
+            axes.plot(lost, [1.0] * len(lost), "x", color=colour, transform=axes.get_xaxis_transform(), clip_on=False)
         axes.axhline(5.0, color="#888888", lw=0.8, ls=":")
         axes.set(xlabel=AXES[panel], ylabel="mean error x100", yscale="log")
         if panel == "vertices":
