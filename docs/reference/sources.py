@@ -1,6 +1,7 @@
-"""Move the paragraph "Source: ..." of a docstring from below its parameters to the end of its description.
+"""Prepare docstrings for the site: sources where sections do not swallow them, formulas as they are written.
 
-A reader of numpy-style sections takes what follows a section for a part of it.
+A reader of numpy-style sections takes a paragraph "Source: ..." below the parameters for one of them. Formulas are
+shown as text: whatever sets them would have to come from the network.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from typing import Any
 import griffe
 
 SOURCE = re.compile(r"(?:^|\n\n)(Source: .*?)(?=\n\n|\Z)", flags=re.DOTALL)
+FORMULA = re.compile(r":math:`([^`]+)`|^\.\. math:: (.+(?:\n[ \t]+\S.*)*)$", flags=re.MULTILINE)
 SECTION = re.compile(r"\n\n[A-Z]\w+\n-{3,}\n")
 
 
@@ -18,10 +20,11 @@ class Sources(griffe.Extension):  # type: ignore[misc]
     """Treat every docstring before it is parsed."""
 
     def on_instance(self, *, obj: Any, **_: Any) -> None:
-        """Move the source, if there is one below a section."""
+        """Set formulas as code; move the source, if there is one below a section."""
         if obj.docstring is None:
             return
-        text = obj.docstring.value
+        text = FORMULA.sub(lambda found: f"`{' '.join((found[1] or found[2]).split())}`", obj.docstring.value)
+        obj.docstring.value = text
         source, section = SOURCE.search(text), SECTION.search(text)
         if source and section and source.start() > section.start():
             rest = text[: source.start()] + text[source.end() :]
