@@ -72,6 +72,7 @@ AXES = {
     "kept": "kept area (%)",
     "stretch": "stretch up to (%)",
 }
+TICKS = (0.5, 1, 2, 5, 10, 20, 50)
 COLOURS = {"anchored": "#c0392b", "gt": "#2c6fbb"}
 SECONDS = 120.0
 SCORED = 2000
@@ -224,7 +225,7 @@ def draw(rows: dict[tuple[Case, str], Row], options: argparse.Namespace, path: P
     """Draw a panel a thing varied: the median as a line, each creature as a dot, a cross on top where some failed."""
     figure = Figure(figsize=(9.0, 6.4), layout="constrained")
     found = list(grouped(rows, options))
-    for axes, panel in zip(figure.subplots(2, 2).ravel(), options.panels, strict=False):
+    for axes, panel in zip(figure.subplots(2, 2, sharey=True).ravel(), options.panels, strict=False):
         for method in options.methods:
             mine = [(value, of) for at, value, word, of in found if (at, word) == (panel, method)]
             known = [(value, [row["error"] for row in of if row["error"] is not None]) for value, of in mine]
@@ -236,13 +237,15 @@ def draw(rows: dict[tuple[Case, str], Row], options: argparse.Namespace, path: P
             for value, errors in known:
                 axes.plot([value] * len(errors), errors, ".", color=colour, alpha=0.35, ms=5, mew=0)
             lost = [value for value, of in mine if any(row["error"] is None for row in of)]
-            axes.plot(lost, [1.0] * len(lost), "x", color=colour, transform=axes.get_xaxis_transform(), clip_on=False)
+            if lost:
+                axes.plot(lost, [0.96] * len(lost), "x", color=colour, transform=axes.get_xaxis_transform())
         axes.axhline(5.0, color="#888888", lw=0.8, ls=":")
         axes.set(xlabel=AXES[panel], ylabel="mean error x100", yscale="log")
+        axes.set_yticks(TICKS, [f"{tick:g}" for tick in TICKS])
         if panel == "vertices":
             axes.set_xscale("log")
             axes.set_xticks(options.values[panel], [f"{value:g}" for value in options.values[panel]])
-            axes.minorticks_off()
+        axes.minorticks_off()
         axes.grid(color=FAINT, linewidth=0.6)
         axes.legend(frameon=False, fontsize=8)
     figure.savefig(path, dpi=150)
