@@ -13,6 +13,7 @@ from types import NoneType, UnionType
 from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 from nonrigid import formulations
+from nonrigid.benchmark.predictions import Predictions
 from nonrigid.formulations.formulation import Formulation
 from nonrigid.geometry.errors import InputError, UnknownNameError
 
@@ -23,12 +24,14 @@ ENTRY_POINTS = "nonrigid.formulations"
 def methods() -> dict[str, type]:
     """Return the formulations by their `method` word: built in, or entry points of `nonrigid.formulations`.
 
+    Among the former is `predictions`, which reads what another program wrote.
+
     Examples
     --------
     >>> methods()["gt"].__name__
     'GameTheoretic'
     """
-    found: dict[str, type] = {}
+    found: dict[str, type] = {Predictions.method: Predictions}
     for module in pkgutil.iter_modules(formulations.__path__):
         if module.ispkg:
             continue

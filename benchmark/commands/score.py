@@ -8,10 +8,13 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from nonrigid.benchmark.commands.summary import show_summary
 from nonrigid.benchmark.datasets.protocols import PairData
 from nonrigid.benchmark.formats import read_truth
 from nonrigid.benchmark.metric import geodesic_errors
 from nonrigid.benchmark.protocol import curve, score
+from nonrigid.benchmark.report.table import summary
+from nonrigid.benchmark.score_predictions import score_predictions
 from nonrigid.benchmark.terminal import say, show_json, show_table
 from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.io import read_mesh
@@ -20,20 +23,41 @@ from nonrigid.geometry.points import SurfacePoints
 
 
 def score_command(
-    correspondence: Annotated[Path, typer.Argument(help="A .corr, .vts or .map file.", show_default=False)],
-    full: Annotated[Path, typer.Option(help="The full surface.", show_default=False)],
-    truth: Annotated[Path, typer.Option(help="The ground truth (.baryc_gt, .vts, .map).", show_default=False)],
+    correspondence: Annotated[
+        Path, typer.Argument(help="A .corr, .vts or .map file, or a folder of them, one a part.", show_default=False)
+    ],
+    full: Annotated[Path | None, typer.Option(help="The full surface.", show_default=False)] = None,
+    truth: Annotated[
+        Path | None, typer.Option(help="The ground truth (.baryc_gt, .vts, .map).", show_default=False)
+    ] = None,
     mirrored: Annotated[
         Path | None, typer.Option(help="The mirrored ground truth (.baryc_gt_sym), accepted as well.")
     ] = None,
     part: Annotated[Path | None, typer.Option(help="The part; coverage and kept area need it.")] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="For a folder: the data set, a folder or archive in any layout.")
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="For a folder: where results go, for `nonrigid report`; by default beside it.")
+    ] = None,
+    label: Annotated[str | None, typer.Option(help="For a folder: the method's name in tables.")] = None,
     metric: Annotated[str, typer.Option(help="dijkstra, heat, edgeflip or exact.")] = "dijkstra",
+    jobs: Annotated[int, typer.Option(help="For a folder: processes.")] = 1,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
-    """Score a correspondence by the protocol of the SHREC'16 partial-matching track.
+    """Score a correspondence, or a folder of them, by the protocol of the SHREC'16 partial-matching track.
 
     Errors are geodesic distances on the full surface in hundredths of the square root of its area.
     """
+    if correspondence.is_dir():
+        if data is None or full is not None or truth is not None:
+            raise InputError(
+                "this is a folder", file=correspondence, remedy="give --data and no --full or --truth; or name one file"
+            )
+        _score_folder(correspondence, data, out, label, metric, jobs, json)
+        return
+    if full is None or truth is None or data is not None:
+        raise InputError("this is one file", file=correspondence, remedy="give --full and --truth, and no --data")
     whole = read_mesh(full)
     piece = None if part is None else read_mesh(part)
     rows = None if piece is None else len(piece.vertices)
@@ -50,6 +74,23 @@ def score_command(
         say("Coverage and kept area need the part: give --part.")
     if swapped is None:
         say("Only the direct map counts as right: give --mirrored to accept the mirrored one, as the track does.")
+
+
+def _score_folder(
+    folder: Path, data: Path, out: Path | None, label: str | None, metric: str, jobs: int, json: bool
+) -> None:
+    place = folder.with_name(f"{folder.resolve().name}-scores") if out is None else out
+    scored = score_predictions(folder, data, out=place, label=label or folder.resolve().name, metric=metric, jobs=jobs)
+    rows = summary(scored.records)
+    if json:
+        show_json({"out": str(place), "scores": rows, "without_prediction": scored.missing, "unused": scored.unused})
+        return
+    show_summary(f"{folder} on {data}", rows)
+    if scored.missing:
+        say(f"{len(scored.missing)} pairs have no prediction and count nowhere, such as {scored.missing[0]}")
+    if scored.unused:
+        say(f"{len(scored.unused)} files fit no pair, such as {scored.unused[0]}")
+    say(f"{len(scored.records)} pairs scored in {place}; `nonrigid report {place}` writes tables, figures and pages")
 
 
 def _record(

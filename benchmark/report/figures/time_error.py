@@ -14,8 +14,11 @@ from nonrigid.benchmark.statistics.averages import pareto_front
 
 
 def error_against_time(series: Sequence[Series]) -> list[Sketch]:
-    """Return the figure of mean error against mean solve time, with quartile bars and the Pareto front."""
-    shown = [one for one in series if one.matched]
+    """Return the figure of mean error against mean solve time, with quartile bars and the Pareto front.
+
+    Another program's predictions took no time to solve here, and are left out.
+    """
+    shown = [one for one in series if any(record["solve_seconds"] > 0 for record in one.matched)]
     if not shown:
         return []
     rows: list[dict[str, Any]] = []
