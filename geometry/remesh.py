@@ -92,7 +92,8 @@ def decimate(mesh: Mesh, vertex_count: int) -> Mesh:
     Raises
     ------
     InputError
-        If the mesh has fewer vertices than asked for, or fewer than four are asked for.
+        If the mesh has fewer vertices than asked for, fewer than four are asked for, or the mesh is not manifold, which
+        collapsing edges may never end with.
 
     Source: Garland and Heckbert 1997, "Surface simplification using quadric error metrics".
     """
@@ -100,6 +101,12 @@ def decimate(mesh: Mesh, vertex_count: int) -> Mesh:
         raise InputError(
             f"{vertex_count} vertices asked of {mesh.name} with {len(mesh.vertices)}",
             remedy="ask for fewer, at least 4",
+        )
+    pinched = len(igl.split_nonmanifold(np.ascontiguousarray(mesh.faces))[1]) - len(np.unique(mesh.faces))
+    if pinched:
+        raise InputError(
+            f"{mesh.name} is not manifold: {pinched} vertices join what only touches",
+            remedy="repair it first, by nonrigid.geometry.clean.clean",
         )
     # Each collapse takes one vertex and two faces.
     face_count = len(mesh.faces) - 2 * (len(mesh.vertices) - vertex_count)

@@ -82,9 +82,11 @@ def _partial_sets(
     prefixes = {match["split"] for folder in folders.values() for stem in folder if (match := _PARTIAL.fullmatch(stem))}
     for place, folder in folders.items():
         parts = {stem: match for stem in folder if (match := _PARTIAL.fullmatch(stem))}
-        if not parts or place.rpartition("/")[2] in ("corres", "corres_sym", "maps"):
+        last = place.rpartition("/")[2]
+        mapped = last == "shapes" and f"{_parent(place)}/maps".lstrip("/") in folders  # the layout `maps`
+        if not parts or mapped or last in ("corres", "corres_sym", "maps"):
             continue
-        packed = place.rpartition("/")[2] == "off"
+        packed = last == "off"
         home = _parent(place) if packed else place
         base = _parent(home)
         beside = {

@@ -54,6 +54,20 @@ def test_folder_and_zip_give_the_same_pairs(
     assert list(tmp_path.iterdir()) == [archive]
 
 
+def test_shapes_beside_maps_may_be_named_as_those_of_the_track(training: Path, tmp_path: Path) -> None:
+    part = open_dataset(training).pairs()[0].load()
+    assert part.truth is not None
+    for folder in ("shapes", "maps"):
+        (tmp_path / folder).mkdir()
+    write_off(part.part, tmp_path / "shapes" / "cuts_cat_shape_1.off")
+    write_off(part.full, tmp_path / "shapes" / "cat.off")
+    rows = part.truth.nearest_corner(part.full)
+    (tmp_path / "maps" / "cuts_cat_shape_1_cat.map").write_text("".join(f"{row}\n" for row in rows))
+    (found,) = open_dataset(tmp_path).pairs()
+    assert found.metadata["layout"] == "maps"
+    np.testing.assert_array_equal(found.load().truth.nearest_corner(part.full), rows)
+
+
 @pytest.mark.parametrize("layout", LAYOUTS)
 @pytest.mark.parametrize(("name", "suffix"), [("out.zip", ".mat"), ("out", ".vert"), ("out", ".ply")])
 def test_every_layout_comes_back_as_written(
