@@ -249,7 +249,10 @@ def _limits(table: object) -> Limits:
         raise InputError(f"limits is {table!r}", remedy="write [limits] and under it seconds = 60")
     _only(table, [item.name for item in fields(Limits)], "[limits]")
     for key, value in table.items():
-        if isinstance(value, bool) or not isinstance(value, int | float):
+        if key == "verbose":
+            if not isinstance(value, bool):
+                raise InputError(f"[limits] verbose is {value!r}", remedy="write true or false")
+        elif isinstance(value, bool) or not isinstance(value, int | float):
             raise InputError(f"[limits] {key} is {value!r}", remedy="give a number")
     limits = Limits(**table)
     if limits.memory_gb is not None and not can_limit_memory():

@@ -1,4 +1,4 @@
-"""How long a solve may take, and how exact it should be."""
+"""How long a solve may take, how exact it should be, and whether the solver may speak."""
 
 from __future__ import annotations
 
@@ -30,6 +30,9 @@ class Limits:
         a little beyond it.
     feasibility
         Largest violation at which a point counts as lying in its sets.
+    verbose
+        Whether the solver's library may print what it does; a benchmark keeps that in the run's log. NLopt, SciPy's
+        L-BFGS-B and the native algorithms have nothing to say.
 
     Examples
     --------
@@ -43,6 +46,7 @@ class Limits:
     memory_gb: float | None = None
     tolerance: float = 1e-6
     feasibility: float = 1e-7
+    verbose: bool = False
 
     def __post_init__(self) -> None:
         for name in ("evaluations", "seconds", "hard_seconds", "memory_gb"):

@@ -118,9 +118,10 @@ def _options(algorithm: str, limits: Limits) -> dict[str, Any]:
     if algorithm == "L-BFGS-B":
         return {"gtol": tight, "ftol": 0.0, "maxiter": _UNBOUNDED, "maxfun": _UNBOUNDED, "maxcor": 20}
     if algorithm == "SLSQP":
-        return {"ftol": max(1e-3 * limits.tolerance**2, 1e-15), "maxiter": _UNBOUNDED}
+        return {"ftol": max(1e-3 * limits.tolerance**2, 1e-15), "maxiter": _UNBOUNDED, "disp": limits.verbose}
     # Its gradient test does not look at complementarity, so it stops far from the bounds: only the radius may stop it.
-    return {"gtol": 0.0, "xtol": 1e-8, "barrier_tol": tight, "maxiter": _UNBOUNDED}
+    words = {"verbose": 2 if limits.verbose else 0}
+    return {"gtol": 0.0, "xtol": 1e-8, "barrier_tol": tight, "maxiter": _UNBOUNDED, **words}
 
 
 def _nonlinear_obstacle(problem: Problem) -> str | None:
@@ -151,7 +152,8 @@ def _milp(oracle: Oracle, start: FloatArray, limits: Limits) -> Raw:
         integrality=np.concatenate(parts).astype(int),
         bounds=scipy.optimize.Bounds(oracle.lower, oracle.upper),
         constraints=rows,
-        options={"mip_rel_gap": 1e-9} | ({} if limits.seconds is None else {"time_limit": float(limits.seconds)}),
+        options={"mip_rel_gap": 1e-9, "disp": limits.verbose}
+        | ({} if limits.seconds is None else {"time_limit": float(limits.seconds)}),
     )
     if found.x is not None:
         oracle.observe(found.x)

@@ -125,7 +125,7 @@ class Casadi:
         solver = ca.nlpsol("solver", plugin, nlp.nlp, options)
         oracle.built()
         # Bonmin logs each node through Python's stdout whatever its options say.
-        with contextlib.redirect_stdout(io.StringIO()):
+        with contextlib.nullcontext() if limits.verbose else contextlib.redirect_stdout(io.StringIO()):
             found = solver(
                 x0=np.clip(start, oracle.lower, oracle.upper),
                 lbx=oracle.lower,

@@ -1,4 +1,4 @@
-"""How each solver of CasADi is set: silent, as exact as asked, and within the time given."""
+"""How each solver of CasADi is set: silent unless asked, as exact as wanted, and within the time given."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from nonrigid.solvers.limits import Limits
 # loading in the same process; qpoases, which prints its licence at every solve; cbc, clp, hpipm, which take no such
 # program.
 QP_PLUGINS = tuple(name for name in ("qrqp", "osqp", "daqp", "piqp", "proxqp") if ca.has_conic(name))
+_TALK = 5  # level at which IPOPT prints a line an iteration
 _UNBOUNDED = 10**9  # the solvers' own limits on iterations are lifted: the oracle keeps the limits
 _QUIET = {"print_time": False, "error_on_fail": False, "show_eval_warnings": False}
 
@@ -41,7 +42,7 @@ def _ipopt(limits: Limits, nlp: Transcription, bound_push: float, *, exact: bool
     # The Frank-Wolfe gap sums the complementarity products that IPOPT bounds one by one, hence the factors.
     tight = 1e-3 * limits.tolerance
     options: dict[str, Any] = {
-        "print_level": 0,
+        "print_level": _TALK if limits.verbose else 0,
         "sb": "yes",
         "tol": tight,
         "compl_inf_tol": tight,
@@ -77,14 +78,14 @@ def _sqp(plugin: str, limits: Limits, memory: int) -> dict[str, Any]:
         "tol_du": 0.1 * limits.tolerance,
         "tol_pr": 0.1 * limits.feasibility,
         "print_header": False,
-        "print_iteration": False,
-        "print_status": False,
+        "print_iteration": limits.verbose,
+        "print_status": limits.verbose,
     }
 
 
 def _bonmin(limits: Limits) -> dict[str, Any]:
     options: dict[str, Any] = {
-        "print_level": 0,
+        "print_level": _TALK if limits.verbose else 0,
         "sb": "yes",
         # Branch and bound on interior points; the outer approximations call such problems infeasible (measured).
         "algorithm": "B-BB",
@@ -99,7 +100,7 @@ def _bonmin(limits: Limits) -> dict[str, Any]:
 
 def _uno(limits: Limits) -> dict[str, Any]:
     options: dict[str, Any] = {
-        "logger": "SILENT",
+        "logger": "INFO" if limits.verbose else "SILENT",
         "preset": "filtersqp",
         "primal_tolerance": 0.1 * limits.feasibility,
         "dual_tolerance": 0.1 * limits.tolerance,

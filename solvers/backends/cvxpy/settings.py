@@ -1,4 +1,4 @@
-"""How each solver of CVXPY is set: silent, as exact as asked, and within the time left."""
+"""How each solver of CVXPY is set: silent unless asked, as exact as wanted, and within the time left."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def convex_options(algorithm: str, limits: Limits, seconds_left: float | None) -
         },
         "HIGHS": {"primal_feasibility_tolerance": max(tight, 1e-10), "dual_feasibility_tolerance": max(tight, 1e-10)},
     }
-    chosen = dict(options[algorithm])
+    chosen = options[algorithm] | {"verbose": limits.verbose}
     switch = {"CLARABEL": "time_limit", "SCS": "time_limit_secs", "OSQP": "time_limit", "HIGHS": "time_limit"}
     if seconds_left is not None and algorithm in switch:
         chosen[switch[algorithm]] = max(float(seconds_left), 1e-3)
@@ -42,8 +42,9 @@ def nonlinear_options(algorithm: str, limits: Limits) -> dict[str, Any]:
     """Return the options of one nonlinear solve."""
     tight = 0.1 * limits.tolerance
     if algorithm == "nlp-IPOPT":
-        options: dict[str, Any] = {"tol": tight, "print_level": 0, "sb": "yes", "bound_push": 1e-8, "bound_frac": 1e-8}
+        options: dict[str, Any] = {"tol": tight, "sb": "yes", "bound_push": 1e-8, "bound_frac": 1e-8}
+        options["print_level"] = 5 if limits.verbose else 0
         return options if limits.seconds is None else options | {"max_wall_time": float(limits.seconds)}
-    options = {"preset": "filtersqp", "logger": "SILENT", "primal_tolerance": 0.1 * limits.feasibility}
-    options["dual_tolerance"] = tight
+    options = {"preset": "filtersqp", "logger": "INFO" if limits.verbose else "SILENT"}
+    options |= {"primal_tolerance": 0.1 * limits.feasibility, "dual_tolerance": tight}
     return options if limits.seconds is None else options | {"time_limit": float(limits.seconds)}
