@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from nonrigid.geometry.arrays import FloatArray, IntArray
-from nonrigid.geometry.maps import nearest_rows
+from nonrigid.geometry.maps import RowSearch, nearest_rows
 from nonrigid.geometry.spectrum import Spectrum
 
 SPREAD = 0.03
@@ -146,10 +146,10 @@ def spectral_closest_points(
     >>> bool(np.allclose(found, turn)), round(distance, 12)
     (True, 0.0)
     """
-    D = C
+    D, search = C, RowSearch(full)
     best: tuple[FloatArray, float] = D, np.inf
     for _ in range(iterations + 1):
-        nearest, squared = nearest_rows(part @ D.T, full)
+        nearest, squared = search.nearest(part @ D.T)
         distance = float(np.sqrt(squared).mean())
         # The start need not be orthonormal: its distance is not one to compare with.
         if D is not C and distance >= best[1]:

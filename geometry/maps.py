@@ -53,36 +53,58 @@ def nearest_rows(
     >>> nearest_rows(np.array([[0.1], [2.2]]), np.array([[0.0], [1.0], [2.0]]))[0]
     array([0, 2])
     """
-    queries, targets = _checked(queries, "queries"), _checked(targets, "targets")
-    if queries.shape[1] != targets.shape[1]:
-        raise InputError(f"queries have {queries.shape[1]} columns, targets {targets.shape[1]}", remedy="use one basis")
-    if not 1 <= count <= len(targets):
-        raise InputError(f"{count} neighbours among {len(targets)} targets", remedy=f"ask for 1 to {len(targets)}")
-    if np.dtype(dtype) not in (np.dtype(np.float32), np.dtype(np.float64)):
-        raise InputError(f"matrix products in {np.dtype(dtype)}", remedy="use float32 or float64")
-    kind: np.dtype[np.floating] = np.dtype(np.float32 if np.dtype(dtype) == np.float32 else np.float64)
+    return RowSearch(targets, dtype=dtype).nearest(queries, count=count, block=block)
 
-    # Products of centred rows of length at most one neither overflow nor cancel more than they must.
-    centre = targets.mean(axis=0)
-    size = max(_largest_offset(targets, centre), _largest_offset(queries, centre))
-    unit = 1.0 / size if size > 0.0 else 1.0
-    right = (targets - centre) * unit
-    half_norms = (0.5 * np.square(right).sum(axis=1)).astype(kind)
-    reach = float(np.linalg.norm(right, axis=1).max())
-    right_t = np.ascontiguousarray(right.T.astype(kind))
 
-    indices = np.empty((len(queries), count), dtype=np.int64)
-    squared = np.empty((len(queries), count))
-    for start in range(0, len(queries), block):
-        rows = slice(start, start + block)
-        left = (queries[rows] - centre) * unit
-        scores = left.astype(kind) @ right_t
-        np.subtract(half_norms, scores, out=scores)
-        slack = 2.0 * _rounding(np.linalg.norm(left, axis=1), reach, queries.shape[1], kind)
-        near = scores <= _limits(scores, count, slack)[:, None]
-        query, target = np.divmod(np.flatnonzero(near), near.shape[1])  # far faster than nonzero in 2D
-        indices[rows], squared[rows] = _ranked(query, target, queries[rows], targets, count)
-    return (indices[:, 0], squared[:, 0]) if count == 1 else (indices, squared)
+class RowSearch:
+    """Hold targets prepared for several searches; see `nearest_rows`, which prepares them for one.
+
+    Examples
+    --------
+    >>> search = RowSearch(np.array([[0.0], [1.0], [2.0]]))
+    >>> search.nearest(np.array([[0.1]]))[0], search.nearest(np.array([[2.2]]))[0]
+    (array([0]), array([2]))
+    """
+
+    def __init__(self, targets: FloatArray, *, dtype: DTypeLike = np.float32) -> None:
+        self._targets = _checked(targets, "targets")
+        if np.dtype(dtype) not in (np.dtype(np.float32), np.dtype(np.float64)):
+            raise InputError(f"matrix products in {np.dtype(dtype)}", remedy="use float32 or float64")
+        self._kind: np.dtype[np.floating] = np.dtype(np.float32 if np.dtype(dtype) == np.float32 else np.float64)
+        # Products of centred rows of length about one neither overflow nor cancel more than they must.
+        self._centre = self._targets.mean(axis=0) if len(self._targets) else np.zeros(self._targets.shape[1])
+        size = _largest_offset(self._targets, self._centre)
+        self._unit = 1.0 / size if size > 0.0 else 1.0
+        right = (self._targets - self._centre) * self._unit
+        norms = np.square(right).sum(axis=1)
+        self._half_norms = (0.5 * norms).astype(self._kind)
+        self._reach = float(np.sqrt(norms.max(initial=0.0)))
+        self._right_t = np.ascontiguousarray(right.T.astype(self._kind))
+
+    def nearest(self, queries: FloatArray, *, count: int = 1, block: int = 512) -> tuple[IntArray, FloatArray]:
+        """Return, for each query, the `count` nearest targets and their squared distances; see `nearest_rows`."""
+        queries, targets = _checked(queries, "queries"), self._targets
+        if queries.shape[1] != targets.shape[1]:
+            raise InputError(
+                f"queries have {queries.shape[1]} columns, targets {targets.shape[1]}", remedy="use one basis"
+            )
+        if not 1 <= count <= len(targets):
+            raise InputError(f"{count} neighbours among {len(targets)} targets", remedy=f"ask for 1 to {len(targets)}")
+        # Queries far outside would overflow: all is divided by how far they are.
+        far = max(1.0, _largest_offset(queries, self._centre) * self._unit)
+        half_norms = self._half_norms if far == 1.0 else (self._half_norms / far).astype(self._kind)
+        indices = np.empty((len(queries), count), dtype=np.int64)
+        squared = np.empty((len(queries), count))
+        for start in range(0, len(queries), block):
+            rows = slice(start, start + block)
+            left = (queries[rows] - self._centre) * (self._unit / far)
+            scores = left.astype(self._kind) @ self._right_t
+            np.subtract(half_norms, scores, out=scores)
+            slack = 2.0 * _rounding(np.linalg.norm(left, axis=1), self._reach, queries.shape[1], self._kind)
+            near = scores <= _limits(scores, count, slack)[:, None]
+            query, target = np.divmod(np.flatnonzero(near), near.shape[1])  # far faster than nonzero in 2D
+            indices[rows], squared[rows] = _ranked(query, target, queries[rows], targets, count)
+        return (indices[:, 0], squared[:, 0]) if count == 1 else (indices, squared)
 
 
 def _checked(rows: FloatArray, name: str) -> FloatArray:
