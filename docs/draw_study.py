@@ -124,7 +124,7 @@ def draw(records: Sequence[Record], place: Path) -> None:
                 label=backend,
             )
         axis.set(xscale="log", xlabel="gap of the first problem", title=NAMES.get(method, method))
-        axis.set_xlim(SMALLEST / 3, 3.0)
+        axis.set_xlim(SMALLEST / 3, 3.0 * max(1.0, *(run["gap"] or 0.0 for run in records)))
         axis.set_ylim(bottom=0)
         axis.grid(color="#dddddd", linewidth=0.6)
     axes[0].set_ylabel("mean geodesic error x100")
