@@ -108,7 +108,7 @@ class PartialFunctionalMap:
     landmark_decay: float = 46.0
     closest_point_iterations: int = 10
     closest_point_samples: int = 500
-    map_evaluations: int = 300
+    map_evaluations: int = 200
     region_evaluations: int = 60
 
     method: ClassVar[str] = "pfm"
