@@ -9,6 +9,7 @@ import platform
 import subprocess
 from functools import cache
 from importlib.metadata import PackageNotFoundError, requires, version
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,9 @@ import scipy.linalg
 from threadpoolctl import threadpool_info  # type: ignore[import-untyped]
 
 from nonrigid import benchmark, formulations, geometry, solvers
+from nonrigid.geometry.errors import NonrigidError
 from nonrigid.solvers.backend import backend_class, backend_names
+from nonrigid.solvers.confine import child_context
 
 _ROOMS = (geometry, formulations, solvers, benchmark)
 
@@ -44,9 +47,28 @@ def environment() -> dict[str, object]:
 
 @cache
 def known_environment() -> tuple[str, dict[str, object]]:
-    """Return a short word for this process's environment, and the environment, looked up once."""
-    found = environment()
+    """Return a short word for this process's environment, and the environment, looked up once.
+
+    A child looks, since all backends have to be loaded for it: a process that holds them all is slow to fork for runs.
+    """
+    context = child_context()
+    here, there = context.Pipe(duplex=False)
+    child = context.Process(target=_tell, args=(there,), daemon=False)
+    child.start()
+    there.close()
+    try:
+        found = here.recv()
+    except EOFError:
+        raise NonrigidError("the libraries of the backends cannot be loaded: see what they printed") from None
+    finally:
+        child.join()
+        here.close()
     return hashlib.sha256(json.dumps(found, sort_keys=True, default=str).encode()).hexdigest()[:12], found
+
+
+def _tell(pipe: Connection) -> None:
+    pipe.send(environment())
+    pipe.close()
 
 
 @cache

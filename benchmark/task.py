@@ -12,7 +12,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
 
 from nonrigid.benchmark.datasets.protocols import PairData, PairSpec
-from nonrigid.benchmark.environment import known_environment
+from nonrigid.benchmark.environment import known_environment, source_digest
 from nonrigid.benchmark.guard import Ended, guarded_call
 from nonrigid.benchmark.protocol import random_rigid_motion
 from nonrigid.benchmark.run import Run, do_run, memory_words, write_failure, write_loss
@@ -60,6 +60,7 @@ def do_task(task: Task) -> None:
             f"machines share, or run each share of the plan by itself and `nonrigid merge` the results"
         )
     store.write_environment(*known_environment())
+    source_digest()  # here, and the backends' versions below, so that no run has to look them up
     cold: list[str] = []
     while todo := tuple(run for run in task.runs if not store.has(run.id)):
         first = todo[0]
@@ -124,6 +125,7 @@ def _loaded(task: Task) -> tuple[PairData, Pair]:
 def _warm(formulation: Formulation, pair: Pair) -> None:
     # What this raises, the runs raise again, each into its own row.
     with contextlib.suppress(Exception):
+        _ = pair.part.mesh, pair.full.mesh  # repaired once, for a method that looks at them late as well
         next(iter(formulation.stages(pair)))
 
 

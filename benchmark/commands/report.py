@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import webbrowser
 from pathlib import Path
 from typing import Annotated
@@ -24,15 +25,18 @@ def report_command(
     data: Annotated[
         Path | None, typer.Option(help="Folder of the data set's files; else $NONRIGID_DATA, else ../shared/data.")
     ] = None,
-    jobs: Annotated[int, typer.Option(help="Processes.")] = 1,
+    jobs: Annotated[
+        int, typer.Option(help="Processes; as many as there are cores by default.", show_default=False)
+    ] = 0,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Print solver against accuracy, and write DIR/report: an overview, a page a pair, figures and tables."""
     # Drawing takes a second to load, which other commands need not wait for.
     from nonrigid.benchmark.report.write import draw_figures, pair_specs, write_report
 
-    if jobs < 1:
+    if jobs < 0:
         raise InputError(f"--jobs is {jobs}", remedy="give at least 1")
+    jobs = jobs or os.cpu_count() or 1
     store = Store(folder)
     index, records = store.index(), store.records()
     root = index.get("root")
