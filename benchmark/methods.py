@@ -24,14 +24,12 @@ ENTRY_POINTS = "nonrigid.formulations"
 def methods() -> dict[str, type]:
     """Return the formulations by their `method` word: built in, or entry points of `nonrigid.formulations`.
 
-    Among the former is `predictions`, which reads what another program wrote.
-
     Examples
     --------
     >>> methods()["gt"].__name__
     'GameTheoretic'
     """
-    found: dict[str, type] = {Predictions.method: Predictions}
+    found: dict[str, type] = {}
     for module in pkgutil.iter_modules(formulations.__path__):
         if module.ispkg:
             continue
@@ -48,6 +46,8 @@ def methods() -> dict[str, type]:
 def make_method(name: str, settings: Mapping[str, object] | None = None) -> Formulation:
     """Return the formulation of that name with these settings; text is read as the type of the field.
 
+    Besides those of `methods`, `predictions` reads what another program wrote.
+
     Raises
     ------
     UnknownNameError
@@ -60,9 +60,10 @@ def make_method(name: str, settings: Mapping[str, object] | None = None) -> Form
     >>> make_method("gt", {"kernel_width": "0.02"}).kernel_width
     0.02
     """
-    if name not in methods():
-        raise UnknownNameError("method", name, methods())
-    kind = methods()[name]
+    known = {**methods(), Predictions.method: Predictions}
+    if name not in known:
+        raise UnknownNameError("method", name, known)
+    kind = known[name]
     made: Formulation = kind(**typed_settings(kind, settings or {}, owner=name))
     return made
 

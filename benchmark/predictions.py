@@ -27,31 +27,24 @@ class Predictions:
         Holds a file a pair, named as the part's file: `<part>.corr`, `<part>.vts` or `<part>.map`, one row a vertex of
         the part.
     contents
-        Hash of these files, so that a benchmark scores them again once they change.
+        Hash of these files, so that a benchmark scores them again once they change; of nothing while there are none.
 
-    Raises
-    ------
-    InputError
-        If the folder holds no such file, or two for one part; later, if it holds none for the part that is matched.
+    `stages` raises `InputError` where the folder holds no file for the part, or two.
 
     Examples
     --------
-    >>> Predictions(folder="nowhere")
-    Traceback (most recent call last):
-        ...
-    nonrigid.geometry.errors.InputError: nowhere: holds no predictions; put <part>.corr, .vts or .map files there
+    >>> Predictions(folder="theirs").folder
+    'theirs'
     """
 
-    folder: str
+    folder: str = "predictions"
     contents: str = field(init=False)
 
     method: ClassVar[str] = "predictions"
 
     def __post_init__(self) -> None:
-        files = predicted(Path(self.folder))
-        object.__setattr__(
-            self, "contents", content_hash(*[part for name in files for part in (name, files[name].read_bytes())])
-        )
+        told = [part for path in _files(Path(self.folder)) for part in (path.name, path.read_bytes())]
+        object.__setattr__(self, "contents", content_hash(*told))
 
     def stages(self, pair: Pair) -> Stages:
         """State no problem; return what the part's file says."""
@@ -78,11 +71,14 @@ def predicted(folder: Path) -> dict[str, Path]:
         If there are none, or two for one part.
     """
     files: dict[str, Path] = {}
-    for path in sorted(folder.iterdir()) if folder.is_dir() else ():
-        if path.suffix in SUFFIXES:
-            if path.stem in files:
-                raise InputError(f"{files[path.stem].name} is there as well", file=path, remedy="keep one of them")
-            files[path.stem] = path
+    for path in _files(folder):
+        if path.stem in files:
+            raise InputError(f"{files[path.stem].name} is there as well", file=path, remedy="keep one of them")
+        files[path.stem] = path
     if not files:
         raise InputError("holds no predictions", file=folder, remedy="put <part>.corr, .vts or .map files there")
     return files
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(path for path in folder.iterdir() if path.suffix in SUFFIXES) if folder.is_dir() else []

@@ -10,7 +10,7 @@ import pytest
 
 from nonrigid.benchmark.datasets.protocols import PairData
 from nonrigid.benchmark.formats import write_baryc, write_corr
-from nonrigid.benchmark.predictions import Predictions
+from nonrigid.benchmark.predictions import predicted
 from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.io import write_off
 from nonrigid.geometry.points import SurfacePoints
@@ -74,4 +74,4 @@ def test_what_cannot_be_scored_is_named(dataset: Path, folder: Path, nonrigid: C
     assert "give --full and --truth" in nonrigid("score", folder / "a.map").err
     (folder / "a.vts").write_text("1\n")
     with pytest.raises(InputError, match="keep one of them"):
-        Predictions(folder=str(folder))
+        predicted(folder)
