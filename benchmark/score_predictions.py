@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from nonrigid.benchmark.datasets.archive import open_dataset
 from nonrigid.benchmark.plan import read_plan
@@ -64,10 +65,10 @@ def score_predictions(
             file=folder,
             remedy=f"name them as the parts, such as {next(iter(pairs.values()))}.corr",
         )
-    out.mkdir(parents=True, exist_ok=True)
-    plan = out / "plan.toml"
-    plan.write_text(_plan_text(data.resolve(), names, folder.resolve(), label, metric), encoding="utf-8")
-    records = run_plan(read_plan(plan), out, jobs=jobs, quiet=True)
+    with TemporaryDirectory() as place:
+        plan = Path(place, "predictions.toml")
+        plan.write_text(_plan_text(data.resolve(), names, folder.resolve(), label, metric), encoding="utf-8")
+        records = run_plan(read_plan(plan), out, jobs=jobs, quiet=True)
     known = set(pairs.values())
     return Scored(
         records=records,

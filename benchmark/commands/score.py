@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -50,14 +51,14 @@ def score_command(
     Errors are geodesic distances on the full surface in hundredths of the square root of its area.
     """
     if correspondence.is_dir():
-        if data is None or full is not None or truth is not None:
-            raise InputError(
-                "this is a folder", file=correspondence, remedy="give --data and no --full or --truth; or name one file"
-            )
+        _refuse(correspondence, "a folder", {"--full": full, "--truth": truth, "--mirrored": mirrored, "--part": part})
+        if data is None:
+            raise InputError("this is a folder", file=correspondence, remedy="give --data; or name one file")
         _score_folder(correspondence, data, out, label, metric, jobs, json)
         return
-    if full is None or truth is None or data is not None:
-        raise InputError("this is one file", file=correspondence, remedy="give --full and --truth, and no --data")
+    _refuse(correspondence, "one file", {"--data": data, "--out": out, "--label": label})
+    if full is None or truth is None:
+        raise InputError("this is one file", file=correspondence, remedy="give --full and --truth")
     whole = read_mesh(full)
     piece = None if part is None else read_mesh(part)
     rows = None if piece is None else len(piece.vertices)
@@ -74,6 +75,13 @@ def score_command(
         say("Coverage and kept area need the part: give --part.")
     if swapped is None:
         say("Only the direct map counts as right: give --mirrored to accept the mirrored one, as the track does.")
+
+
+def _refuse(given: Path, kind: str, options: Mapping[str, object]) -> None:
+    """Refuse options that say nothing about this kind of input."""
+    for name, value in options.items():
+        if value is not None:
+            raise InputError(f"{name} says nothing about {kind}", file=given, remedy=f"leave {name} out")
 
 
 def _score_folder(

@@ -72,6 +72,9 @@ def test_what_cannot_be_scored_is_named(dataset: Path, folder: Path, nonrigid: C
     assert "cuts_anton_shape_1.corr" in answer.err
     assert "give --data" in nonrigid("score", folder).err
     assert "give --full and --truth" in nonrigid("score", folder / "a.map").err
+    # What would be passed over is refused.
+    assert "leave --part out" in nonrigid("score", folder, "--data", dataset, "--part", folder / "a.map").err
+    assert "leave --label out" in nonrigid("score", folder / "a.map", "--label", "they").err
     (folder / "a.vts").write_text("1\n")
     with pytest.raises(InputError, match="keep one of them"):
         predicted(folder)
