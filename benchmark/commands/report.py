@@ -25,18 +25,16 @@ def report_command(
     data: Annotated[
         Path | None, typer.Option(help="Folder of the data set's files; else $NONRIGID_DATA, else ../shared/data.")
     ] = None,
-    jobs: Annotated[
-        int, typer.Option(help="Processes; as many as there are cores by default.", show_default=False)
-    ] = 0,
+    jobs: Annotated[int | None, typer.Option(help="Processes; by default one a core.", show_default=False)] = None,
     json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Print solver against accuracy, and write DIR/report: an overview, a page a pair, figures and tables."""
     # Drawing takes a second to load, which other commands need not wait for.
     from nonrigid.benchmark.report.write import draw_figures, pair_specs, write_report
 
-    if jobs < 0:
+    processes = (os.cpu_count() or 1) if jobs is None else jobs
+    if processes < 1:
         raise InputError(f"--jobs is {jobs}", remedy="give at least 1")
-    jobs = jobs or os.cpu_count() or 1
     store = Store(folder)
     index, records = store.index(), store.records()
     root = index.get("root")
@@ -48,7 +46,7 @@ def report_command(
         draw_figures(out, records, only=figure)
         say(f"Figure: {(out / figure).resolve()}.pdf, .png, .csv, .tex, -light.svg, -dark.svg")
         return
-    page = write_report(folder, index, records, data=data, jobs=jobs)
+    page = write_report(folder, index, records, data=data, jobs=processes)
     rows = summary(records)
     known = [*notes(index, records), *filter(None, [pair_specs(folder, data)[1]])]
     if json:
