@@ -50,6 +50,11 @@ def known_environment() -> tuple[str, dict[str, object]]:
     """Return a short word for this process's environment, and the environment, looked up once.
 
     A child looks, since all backends have to be loaded for it: a process that holds them all is slow to fork for runs.
+
+    Raises
+    ------
+    NonrigidError
+        If the child dies of it, as where a library crashes while it is loaded.
     """
     context = child_context()
     here, there = context.Pipe(duplex=False)

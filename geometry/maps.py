@@ -59,6 +59,18 @@ def nearest_rows(
 class RowSearch:
     """Hold targets prepared for several searches; see `nearest_rows`, which prepares them for one.
 
+    Parameters
+    ----------
+    targets
+        (t, d) finite rows.
+    dtype
+        float32 or float64, the precision of the matrix products.
+
+    Raises
+    ------
+    InputError
+        If a row is not finite or the precision is another; in `nearest` as `nearest_rows` does.
+
     Examples
     --------
     >>> search = RowSearch(np.array([[0.0], [1.0], [2.0]]))

@@ -119,6 +119,22 @@ def test_single_precision_products_change_six_digits_at_most(pair: Pair) -> None
     assert np.abs(fast[1] - exact[1]).max() < 1e-5 * np.abs(exact[1]).max()
 
 
+def test_functions_of_low_rank_are_those_of_their_factors() -> None:
+    rng = np.random.default_rng(0)
+    basis, mass, v = rng.standard_normal((12, 4)), rng.uniform(0.1, 1.0, 12), rng.standard_normal(12)
+    factor, mixing, target = rng.standard_normal((12, 2)), rng.standard_normal((6, 2)), rng.standard_normal((4, 6))
+    whole = MaskedBasis(basis, mass, factor @ mixing.T)
+    factored = MaskedBasis(basis, mass, factor, mixing=mixing)
+    assert factored.count == whole.count == 6
+    value, gradient = MaskedTarget(target, whole).value_and_gradient(v)
+    again, slope = MaskedTarget(target, factored).value_and_gradient(v)
+    assert again == pytest.approx(value, rel=1e-12)
+    np.testing.assert_allclose(slope, gradient, rtol=1e-10, atol=1e-12)
+    check_term(MaskedTarget(target, factored), 12, rng_seed=0, points=2)
+    with pytest.raises(ModelError, match="give it 2 columns"):
+        MaskedBasis(basis, mass, factor, mixing=mixing.T)
+
+
 def test_wrong_data_is_refused_in_words() -> None:
     whole = MaskedBasis(np.ones((2, 1)), np.ones(2), np.ones((2, 3)))
     for make, words in (

@@ -8,13 +8,27 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nonrigid.geometry.errors import InputError
-from nonrigid.geometry.maps import nearest_rows
+from nonrigid.geometry.maps import RowSearch, nearest_rows
 
 
 def exhaustive(queries: np.ndarray, targets: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     squared = np.square(queries[:, None] - targets[None]).sum(axis=2)
     order = np.argsort(squared, axis=1, kind="stable")[:, :count]
     return order, np.take_along_axis(squared, order, axis=1)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 10_000), count=st.integers(1, 3), apart=st.sampled_from([0.0, 10.0, 1000.0]))
+def test_prepared_targets_answer_near_and_far_queries_alike(seed: int, count: int, apart: float) -> None:
+    generator = np.random.default_rng(seed)
+    targets = generator.standard_normal((40, 3))
+    search = RowSearch(targets)
+    for shift in (apart, 0.0):  # far queries leave no trace
+        queries = generator.standard_normal((9, 3)) + shift
+        indices, squared = search.nearest(queries, count=count, block=4)
+        expected, distances = exhaustive(queries, targets, count)
+        np.testing.assert_array_equal(indices.reshape(9, count), expected)
+        np.testing.assert_array_equal(squared.reshape(9, count), distances)
 
 
 @settings(max_examples=60, deadline=None)
