@@ -37,6 +37,7 @@ check: .venv/ready
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/mypy benchmarks docs/*.py
 	$(BIN)/lint-imports
 
 .venv/docs: .venv/ready

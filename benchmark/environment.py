@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import scipy.linalg
-from threadpoolctl import threadpool_info  # type: ignore[import-untyped]
+from threadpoolctl import threadpool_info
 
 from nonrigid import benchmark, formulations, geometry, solvers
 from nonrigid.geometry.errors import NonrigidError

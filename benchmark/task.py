@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from threadpoolctl import threadpool_limits  # type: ignore[import-untyped]
+from threadpoolctl import threadpool_limits
 
 from nonrigid.benchmark.datasets.protocols import PairData, PairSpec
 from nonrigid.benchmark.environment import known_environment, source_digest

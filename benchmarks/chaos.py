@@ -26,6 +26,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from chaos_trial import write_trial
 
@@ -160,7 +161,9 @@ def small_disk(stage: Stage) -> Iterator[tuple[Path, bool]]:
 
 def disturb(stage: Stage, out: Path, mounted: bool, total: int) -> set[str]:
     """Kill, fill and restart until the plan is complete; return the runs that began again though they were finished."""
-    kills, seen, worst, twice = (1 if stage.small else 10), {}, 0.0, set()
+    kills, worst = (1 if stage.small else 10), 0.0
+    seen: dict[str, float] = {}
+    twice: set[str] = set()
     worker_killed = disk_full = False
     killed = turn = 0
     while turn < kills + 12:
@@ -247,7 +250,7 @@ def on_dask(stage: Stage, truth: dict[str, list[object]], total: int) -> None:
         port = probe.getsockname()[1]
     address, out = f"tcp://127.0.0.1:{port}", stage.folder / "dask"
     dask = [sys.executable, "-m", "dask"]
-    quiet = {"env": stage.environment("dask.txt"), "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    quiet: dict[str, Any] = {"env": stage.environment("dask.txt"), "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     scheduler = subprocess.Popen(
         [*dask, "scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"], **quiet
     )

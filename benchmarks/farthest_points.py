@@ -25,7 +25,7 @@ def unpruned(mesh: Mesh, count: int, start: int) -> IntArray:
     graph, priority = virtual_edge_graph(mesh), canonical_priority(mesh)
     samples, cover = [start], np.full(len(mesh.vertices), np.inf)
     while len(samples) < count:
-        np.minimum(cover, dijkstra(graph, directed=True, indices=samples[-1]), out=cover)
+        np.minimum(cover, dijkstra(graph, directed=True, indices=samples[-1:])[0], out=cover)
         tied = np.flatnonzero(cover >= cover.max() * (1 - 1e-9))
         samples.append(int(tied[priority[tied].argmax()]))
     return np.array(samples)

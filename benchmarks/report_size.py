@@ -69,7 +69,7 @@ def fill(folder: Path, count: int) -> None:
     (folder / "plan.toml").write_text(PLAN)
     store = Store(folder)
     store.prepare()
-    labels = {}
+    labels: dict[str, str] = {}
     for pair in range(-(-count // (len(METHODS) * len(BACKENDS)))):
         name = f"cuts_ball_shape_{pair}"
         kept = np.flatnonzero(full.vertices @ generator.normal(size=3) > 0)
@@ -81,13 +81,13 @@ def fill(folder: Path, count: int) -> None:
         write_off(part, folder / "data" / "cuts" / f"{name}.off")
         for suffix in (".baryc_gt", ".baryc_gt_sym"):
             write_baryc(folder / "data" / "cuts" / f"{name}{suffix}", truth)
-        for place, label in enumerate(METHODS):
+        for rank, label in enumerate(METHODS):
             best = generator.uniform(0.5, 1.0)
             for backend in BACKENDS:
                 if len(labels) == count:
                     break
                 run = f"{pair:04}{label}{backend}".replace(":", "-")
-                shown = generator.random(len(kept)) < (1.0 if place < 4 else 0.02)
+                shown = generator.random(len(kept)) < (1.0 if rank < 4 else 0.02)
                 points = SurfacePoints(np.where(shown, truth.faces, -1), truth.barycentric)
                 errors = generator.exponential(0.05, int(shown.sum()))
                 write_points(store.points_file(run), matched_points(points, errors))

@@ -52,8 +52,9 @@ def measure(stage: chaos.Stage, count: int, seconds: float) -> None:
         for number in range(count):
             text += f'[[methods]]\nmethod = "trial"\nlabel = "t{number}"\n'
             text += f"settings = {{ number = {number}, seconds = {pause} }}\n"
-        stage.plan.write_text(text)
-        return stage.plan
+        place: Path = stage.plan
+        place.write_text(text)
+        return place
 
     idle = read_plan(plan(0.0))
     data = idle.pairs()[0].load()
