@@ -250,7 +250,11 @@ def on_dask(stage: Stage, truth: dict[str, list[object]], total: int) -> None:
         port = probe.getsockname()[1]
     address, out = f"tcp://127.0.0.1:{port}", stage.folder / "dask"
     dask = [sys.executable, "-m", "dask"]
-    quiet: dict[str, Any] = {"env": stage.environment("dask.txt"), "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    quiet: dict[str, Any] = {
+        "env": stage.environment("dask.txt"),
+        "stdout": subprocess.DEVNULL,
+        "stderr": subprocess.DEVNULL,
+    }
     scheduler = subprocess.Popen(
         [*dask, "scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"], **quiet
     )
