@@ -110,7 +110,7 @@ def read_plan(path: Path | str, *, data: Path | None = None) -> Plan:
     Parameters
     ----------
     path
-        A file, or "demo" or "gt16".
+        A file, or the name of one that ships with the package, such as "demo".
     data
         Folder of the data set's files; else the plan's `root`, else `$NONRIGID_DATA`, else `../shared/data`.
 
