@@ -27,7 +27,7 @@ class Kind(StrEnum):
 
 
 def bench_command(
-    plan: Annotated[str, typer.Argument(help="A TOML file, or the name of a shipped plan, such as demo.", show_default=False)],
+    plan: Annotated[str, typer.Argument(help="A TOML file, or a shipped plan, such as demo.", show_default=False)],
     out: Annotated[Path, typer.Option(help="Folder of the results.", show_default=False)],
     jobs: Annotated[int, typer.Option(help="Processes.")] = 1,
     executor: Annotated[Kind, typer.Option(help="Who does the runs.")] = Kind.joblib,
