@@ -205,7 +205,8 @@ def _dataset(word: str, settings: dict[str, Any], splits: tuple[str, ...], place
     known = {item.name for item in fields(kind)}
     _only(settings, sorted(known - {"names", "splits"}), f"[data] of {word}")
     if "root" in known:
-        settings["root"] = data or _root(settings.get("root"), place)
+        root = data or _root(settings.get("root"), place)
+        settings["root"] = root.absolute()  # processes that live in another working directory read it too
     elif data is not None:
         raise InputError(f"the data set {word} reads no files", remedy="leave out --data")
     if "templates" in known and "templates" in settings:

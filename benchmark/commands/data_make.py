@@ -41,7 +41,7 @@ def make_command(
     elif source is None:
         raise InputError("the recipe needs meshes", remedy="name their folder by --from")
     else:
-        made = Recipe(root=source, vertices=vertices, seed=seed)
+        made = Recipe(root=source.absolute(), vertices=vertices, seed=seed)
     count = write_dataset(made, out, jobs=jobs)
     if json:
         show_json({"dataset": made.name, "folder": str(out), "parts": count})

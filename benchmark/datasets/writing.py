@@ -48,7 +48,7 @@ def write_dataset(dataset: PosedDataset, folder: Path, *, jobs: int = 1) -> int:
     InputError
         If the folder holds something else, or another data set.
     """
-    folder = Path(folder)
+    folder = Path(folder).absolute()  # helper processes may live in another working directory
     _claim(folder, dataset)
     specs = list(dataset.pairs())
     for name in ("null", *{spec.split for spec in specs}):

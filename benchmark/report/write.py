@@ -61,6 +61,7 @@ def write_report(
     jobs
         Processes that write the pages of pairs.
     """
+    folder = folder.absolute()  # helper processes may live in another working directory
     out = folder / "report"
     for place in (out, out / "pairs", out / "data", out / "assets"):
         place.mkdir(parents=True, exist_ok=True)

@@ -335,3 +335,14 @@ def test_views_of_nothing_are_refused(files: Path, match_file: Path, nonrigid: C
         answer = nonrigid("view", *surfaces, *words)
         assert answer.code == 2
         assert expected in answer.err
+
+
+def test_helpers_started_in_another_working_directory_write_to_the_right_folder(
+    records: list[Record], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    index = {"title": "t", "dataset": "creatures", "metric": "dijkstra", "runs": {r["id"]: "x" for r in records}}
+    for place in ("first", "second"):  # the helpers of the first report live on and write the second
+        (tmp_path / place / "results").mkdir(parents=True)
+        monkeypatch.chdir(tmp_path / place)
+        write_report(Path("results"), index, records, jobs=2)
+        assert len(list(Path("results", "report", "pairs").glob("*.html"))) == len({r["pair"] for r in records})
