@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
@@ -36,6 +36,8 @@ Start = Literal["several", "mask", "descriptors", "anchors"]
 _STARTS = ("several", "mask", "descriptors", "anchors")
 _ENOUGH = 2e-3  # share of its energy by which a step in C has to lie below the one before it for another round
 _TRIAL = 2  # rounds after which starts are compared: one region found for each
+_NEAR = 1.05  # starts with an energy up to this many times the lowest go on to the end
+_APART = 0.01  # unless their images lie nearer than this to those of one that does, mean, in sqrt(full area)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +65,9 @@ class PartialFunctionalMap:
         Where the first run begins. "mask": C is large where W is small, as published but for its scale; see
         `diagonal_start`; the region is the whole. "descriptors": C is the robust orthonormal map of the nearest
         descriptors at the last of `start_radii`, the region where most of them lie. "several": the former, and the
-        latter at each of `start_radii`, run for two rounds each; the one whose last step in C ends lowest goes on.
+        latter at each of `start_radii`, run for two rounds each; the one whose last step in C ends lowest goes on,
+        and so does one that ends up to 5 % higher and matches samples elsewhere, by 0.01 sqrt(full area) in the mean.
+        Whichever ends its last run lowest is the answer.
         "anchors": as "mask", with landmarks instead of descriptors, the matches of `GameTheoretic`.
     start_radii
         Radii of the SHOT descriptors that starts are made from, in units of sqrt(full area).
@@ -128,16 +132,13 @@ class PartialFunctionalMap:
         tried = []
         for start in starts:
             tried.append((yield from self._alternate(joint, bases, start, trial)))
-        kept = min(tried, key=lambda state: state.energy)
-        if len(starts) > 1 and not kept.ended:
-            kept = yield from self._alternate(joint, bases, kept, self.rounds - trial)
-        if self.landmarks:
-            chosen = pair.part.samples(min(self.landmarks, len(pair.part.mesh.vertices)))
-            found = bases.matched(kept.C, chosen)
-            again = _State(C=kept.C, v=np.ones_like(kept.v))
-            kept = yield from self._alternate(
-                self.joint(pair, bases, self._near(pair, chosen, found)), bases, again, self.rounds
-            )
+        ends = []
+        for state in bases.contenders(tried):
+            ended = state
+            if trial < self.rounds and not state.ended:
+                ended = yield from self._alternate(joint, bases, state, self.rounds - trial)
+            ends.append((yield from self._again(pair, bases, ended)) if self.landmarks else ended)
+        kept = min(ends, key=lambda state: state.energy)
         everywhere = np.arange(len(pair.part.mesh.vertices))
         return Correspondence.between_vertices(pair, everywhere, bases.matched(kept.C, everywhere))
 
@@ -207,6 +208,13 @@ class PartialFunctionalMap:
                 break
         return state
 
+    def _again(self, pair: Pair, bases: Bases, state: _State) -> Generator[Problem, Solved, _State]:
+        """Run once more, on functions of the distances to landmarks that a first run matched."""
+        chosen = pair.part.samples(min(self.landmarks, len(pair.part.mesh.vertices)))
+        joint = self.joint(pair, bases, self._near(pair, chosen, bases.matched(state.C, chosen)))
+        begin = _State(C=state.C, v=np.ones_like(state.v))
+        return (yield from self._alternate(joint, bases, begin, self.rounds))
+
     def _near(self, pair: Pair, part: IntArray, full: IntArray) -> tuple[FloatArray, FloatArray]:
         """Return functions that fall off exponentially from matched vertices, one a match, on either surface."""
         around_part = pair.part.distances(part)
@@ -216,12 +224,16 @@ class PartialFunctionalMap:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Bases:
-    """Hold the eigenfunctions of either surface, the rank of maps between them, and samples for closest points."""
+    """Hold the eigenfunctions of either surface, the rank of maps between them, and samples for closest points.
+
+    `vertices`: those of the whole, whose area is 1.
+    """
 
     part: Spectrum
     full: Spectrum
     rank: int
     samples: IntArray
+    vertices: FloatArray
 
     @classmethod
     def of(cls, pair: Pair, eigenfunctions: int, samples: int) -> Bases:
@@ -230,7 +242,8 @@ class Bases:
         size = min(eigenfunctions, fewest - 1)
         part, full = pair.part.spectrum(size), pair.full.spectrum(size)
         chosen = pair.part.samples(min(samples, len(pair.part.mesh.vertices)))
-        return cls(part=part, full=full, rank=estimated_rank(part.eigenvalues, full.eigenvalues), samples=chosen)
+        rank = estimated_rank(part.eigenvalues, full.eigenvalues)
+        return cls(part=part, full=full, rank=rank, samples=chosen, vertices=pair.full.mesh.vertices)
 
     @property
     def size(self) -> int:
@@ -251,6 +264,23 @@ class Bases:
     def padded(self, D: FloatArray) -> FloatArray:
         """Return the (k, k) map of a (k, rank) one: zeros beyond the rank."""
         return np.hstack([D, np.zeros((self.size, self.size - self.rank))])
+
+    def contenders(self, tried: Sequence[_State]) -> list[_State]:
+        """Return the state of lowest energy, and those near it in energy whose matches of samples lie elsewhere."""
+        ordered = sorted(tried, key=lambda state: state.energy)
+        kept, places = ordered[:1], [self.images(ordered[0].C)]
+        for state in ordered[1:]:
+            if state.energy > _NEAR * kept[0].energy:
+                break
+            image = self.images(state.C)
+            if all(np.linalg.norm(image - other, axis=1).mean() > _APART for other in places):
+                kept.append(state)
+                places.append(image)
+        return kept
+
+    def images(self, C: FloatArray) -> FloatArray:
+        """Return where the samples' matches lie, (samples, 3)."""
+        return self.vertices[self.matched(C, self.samples)]
 
     def matched(self, C: FloatArray, part: IntArray) -> IntArray:
         """Return, for vertices of the part, the vertex of the whole nearest to their image."""
