@@ -6,9 +6,11 @@ import contextlib
 import gc
 import os
 import signal
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass
+from itertools import islice
 from multiprocessing.connection import Connection, wait
 from pathlib import Path
 from typing import Any
@@ -84,46 +86,110 @@ def guarded_call(
     >>> guarded_call(lambda tell: None).well
     True
     """
-    context = child_context()
-    here, there = context.Pipe(duplex=False)
-    child = context.Process(target=_child, args=(there, os.getpid(), work, memory_gb, log), daemon=False)
-    deadline = None if seconds is None else time.monotonic() + seconds
-    child.start()
-    there.close()
-    told, failure, killed = "", "", False
-    try:
+    with GuardedChild(work, memory_gb=memory_gb, log=log) as child:
+        child.begin()
+        return child.end(seconds=seconds, until=until)
+
+
+class GuardedChild:
+    """A child process that stands ready to call `work`, so that it can be made while the one before it still works.
+
+    Forking a process that holds a pair and its libraries, and taking it down, takes milliseconds, which nobody has to
+    wait for. A context manager: on leaving it the child and its children are gone, whether they had begun or not.
+
+    Parameters
+    ----------
+    work, memory_gb, log
+        As in `guarded_call`; the child's memory is counted from when it begins.
+
+    Examples
+    --------
+    >>> with GuardedChild(lambda tell: tell("here")) as child:
+    ...     child.begin()
+    ...     child.end().told
+    'here'
+    """
+
+    def __init__(
+        self, work: Callable[[Tell], None], *, memory_gb: float | None = None, log: Path | None = None
+    ) -> None:
+        context = child_context()
+        self._pipe, there = context.Pipe()
+        self._process = context.Process(target=_child, args=(there, os.getpid(), work, memory_gb, log), daemon=False)
+        self._process.start()
+        there.close()
+
+    def __enter__(self) -> GuardedChild:
+        """Return the child."""
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Close the child."""
+        self.close()
+
+    def close(self) -> None:
+        """Kill the child and its children if they still live."""
+        _kill(self._process)
+        self._process.join()
+        self._pipe.close()
+
+    def begin(self) -> None:
+        """Have the child begin."""
+        with contextlib.suppress(OSError):  # a child that was killed meanwhile is found dead by `end`
+            self._pipe.send(None)
+
+    def end(self, *, seconds: float | None = None, until: str | None = None) -> Ended:
+        """Wait for the end of the child's work, or kill it, and say how it ended; arguments as in `guarded_call`."""
+        deadline = None if seconds is None else time.monotonic() + seconds
+        told, child = "", self._process
         while True:
             left = _LOOK_EVERY if deadline is None else min(_LOOK_EVERY, deadline - time.monotonic())
             if left <= 0:
-                killed = True
-                break
-            if wait([here], left):
+                _kill(child)
+                return Ended(well=False, killed=True, words=f"killed after {seconds:g} s of a run", told=told)
+            if wait([self._pipe], left):
                 try:
-                    kind, text = here.recv()
+                    kind, text = self._pipe.recv()
                 except (EOFError, OSError):
                     break
                 if kind == "storage":
                     raise StorageError(text)
-                if kind == "failure":
-                    failure = text
-                else:
-                    told = text
-                    deadline = None if seconds is None or told == until else time.monotonic() + seconds
+                if kind == "done":  # what is left is to take the process down, for which nobody has to wait
+                    return Ended(well=not text, words=text, told=told)
+                told = text
+                deadline = None if seconds is None or told == until else time.monotonic() + seconds
             elif child.exitcode is not None:
                 break  # a grandchild may hold the pipe open
-        if not killed:
-            child.join(_GRACE)
-    finally:
+        child.join(_GRACE)
         _kill(child)
         child.join()
-        here.close()
-    if killed:
-        return Ended(well=False, killed=True, words=f"killed after {seconds:g} s of a run", told=told)
-    if failure:
-        return Ended(well=False, words=failure, told=told)
-    if child.exitcode:
         return Ended(well=False, words=f"the process ended with {_named(child.exitcode)}", told=told)
-    return Ended(well=True, told=told)
+
+
+def one_ahead(children: Iterator[GuardedChild]) -> Generator[GuardedChild]:
+    """Yield each child after it has begun and the one after it stands ready; close it when that is asked for.
+
+    Examples
+    --------
+    >>> works = [lambda tell: tell("one"), lambda tell: tell("two")]
+    >>> [child.end().told for child in one_ahead(GuardedChild(work) for work in works)]
+    ['one', 'two']
+    """
+    open_ones: list[GuardedChild] = []  # that which ended, that which works, that which stands ready
+    try:
+        open_ones += islice(children, 1)
+        while open_ones:
+            child = open_ones[-1]
+            child.begin()
+            open_ones += islice(children, 1)
+            while open_ones[0] is not child:
+                open_ones.pop(0).close()
+            yield child
+            if open_ones[-1] is child:
+                return
+    finally:
+        for child in open_ones:
+            child.close()
 
 
 def _child(
@@ -134,16 +200,24 @@ def _child(
     if hasattr(os, "setpgid"):
         os.setpgid(0, 0)  # so that its own children can be killed with it
     try:
+        pipe.recv()
+    except (EOFError, OSError):
+        return  # nobody wants this work any more
+    try:
         if log is not None:
             speak_into(log)
         if memory_gb is not None:
             limit_memory(memory_gb)
         work(lambda word: pipe.send(("told", word)))
+        last = ("done", "")
     except StorageError as failure:
-        pipe.send(("storage", str(failure)))
+        last = ("storage", str(failure))
     except Exception as failure:  # whatever a third party raises
-        pipe.send(("failure", f"{type(failure).__name__}: {failure}"))
+        last = ("done", f"{type(failure).__name__}: {failure}")
+    sys.stdout.flush()
+    sys.stderr.flush()
     flush_native_output()
+    pipe.send(last)
     pipe.close()
 
 

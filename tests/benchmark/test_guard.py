@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import faulthandler
 import os
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from nonrigid.benchmark.guard import Tell, guarded_call
+from nonrigid.benchmark.guard import GuardedChild, Tell, guarded_call, one_ahead
 from nonrigid.benchmark.store import StorageError
 from nonrigid.formulations.model import Problem, QuadraticForm, Simplex, Variable, maximize
 from nonrigid.solvers.confine import can_limit_memory, is_out_of_memory
@@ -107,3 +109,36 @@ def test_a_solve_that_fills_its_memory_says_so() -> None:
     answer = solve(problem, "nlopt:LD_CCSAQ", limits=Limits(memory_gb=0.1))
     assert answer.status in (Status.LIMIT, Status.BACKEND_ERROR)
     assert ("0.1 GB of memory are spent" if can_limit_memory() else "cannot limit memory") in answer.message
+
+
+def test_the_next_child_stands_ready_while_one_works_and_a_crash_leaves_it_be(tmp_path: Path) -> None:
+    def crash(tell: Tell) -> None:
+        faulthandler.disable()
+        ctypes.string_at(0)
+
+    def hang(tell: Tell) -> None:
+        time.sleep(60)
+
+    made = []
+
+    def children() -> Iterator[GuardedChild]:
+        for number, work in enumerate((crash, hang, lambda tell: tell("well"))):
+            made.append(number)
+            yield GuardedChild(work, log=tmp_path / str(number))
+
+    ended = []
+    for child in one_ahead(children()):
+        ended.append(child.end(seconds=2.0))
+        assert len(made) == min(len(ended) + 1, 3)
+    assert ["SIGSEGV" in ended[0].words, ended[1].killed, ended[2].told] == [True, True, "well"]
+
+
+def test_children_end_with_whoever_stops_asking_for_them(tmp_path: Path) -> None:
+    def late(tell: Tell) -> None:
+        time.sleep(0.5)
+        (tmp_path / "alive").touch()
+
+    with contextlib.closing(one_ahead(GuardedChild(late) for _ in range(3))) as children:
+        next(children)
+    time.sleep(0.8)
+    assert not (tmp_path / "alive").exists()
