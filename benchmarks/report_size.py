@@ -2,7 +2,8 @@
 
 The runs are made up on balls of 10 242 vertices and pieces of them, in the layout of SHREC'16: forty runs a pair, by
 four dense and four sparse methods with five backends each, with four solves of a hundred trace points a run. As in
-`nonrigid report`, one process a core writes; that is compared with reading the same runs alone, which no report can do without.
+`nonrigid report`, one process a core writes; that is compared with reading the same runs alone, which no report can do
+without.
 """
 
 from __future__ import annotations
