@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from nonrigid.formulations.formulation import Correspondence, Pair, Solved, Stages
+from nonrigid.formulations.game_theoretic import GameTheoretic
 from nonrigid.formulations.games import game
 from nonrigid.formulations.model import ElasticNet, Problem
 from nonrigid.formulations.sampled_distances import SampledDistances, sampled_distances
@@ -21,16 +22,28 @@ KEEPING = 0.03
 """Mean change of distances, in units of sqrt(full area), at which a match has confidence 1/2."""
 
 
+_GAIN = 0.002
+"""Mean confidence that a map has to gain when it grows again, for another time to be worth it."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Start:
-    """Hold the factors by which one start differs from the settings: shapes differ in which start fails."""
+    """Say how one start's anchors differ from the settings': shapes differ in which start fails.
 
-    mix: float = 1.0
+    Parameters
+    ----------
+    kernel_width, per_sample
+        Factors of the settings of the same name.
+    peeled
+        Whether the anchors are those of `GameTheoretic`: groups peeled off, merged, and a game near by.
+    """
+
     kernel_width: float = 1.0
-    placing_weight: float = 1.0
+    per_sample: int = 1
+    peeled: bool = False
 
 
-STARTS = (Start(), Start(kernel_width=1.6, placing_weight=3.0), Start(placing_weight=3.0), Start(mix=0.0))
+STARTS = (Start(), Start(kernel_width=2 / 3), Start(peeled=True), Start(per_sample=2))
 """Starts in the order in which they are tried."""
 
 
@@ -42,7 +55,10 @@ class Anchored:
     2. Distances to the anchors place every sample of the part. Those whose distances to their neighbours agree best
        become the next anchors, nearer ones; and again.
     3. "map": a functional map with orthonormal columns is fitted to the samples and better images are read off it, with
-       ever more eigenfunctions. The last map reads off every vertex, and a point of a triangle around the best vertex.
+       ever more eigenfunctions.
+    4. Where the mean confidence of the best map from several starts is low, its best images become anchors in their
+       turn, and steps 2 and 3 are done again while that makes it surer.
+    5. The last map reads off every vertex, and a point of a triangle around the best vertex.
 
     Descriptors take part in each step, by how far they can be trusted: near its boundary a part does not look like the
     whole.
@@ -74,6 +90,8 @@ class Anchored:
     starts, enough
         Largest number of starts, and the mean confidence at which no other is tried; the one with the highest mean
         confidence wins.
+    repeats
+        How often, at most, an unsure map's images become anchors again.
     part_size, full_size
         Largest numbers of eigenfunctions.
     between_vertices
@@ -91,7 +109,7 @@ class Anchored:
     full_samples: int = 1500
     per_sample: int = 10
     kernel_width: float = 0.03
-    mix: float = 0.8
+    mix: float = 0.5
     floor: float = 0.05
     reach: float = 0.25
     local_reach: float = 0.12
@@ -106,6 +124,7 @@ class Anchored:
     components: int = 80
     starts: int = 4
     enough: float = 0.85
+    repeats: int = 3
     part_size: int = 100
     full_size: int = 200
     between_vertices: bool = True
@@ -114,7 +133,9 @@ class Anchored:
 
     def stages(self, pair: Pair) -> Stages:
         """State the game, then one map a step; return one point a vertex of the part."""
-        bounds = (("steps", 1, 1000), ("last_steps", 0, 1000), ("starts", 1, len(STARTS)))
+        bounds = (
+            ("steps", 1, 1000), ("last_steps", 0, 1000), ("repeats", 0, 1000), ("starts", 1, len(STARTS)),
+        )  # fmt: skip
         for name, least, most in bounds:
             value = getattr(self, name)
             if not least <= value <= most:
@@ -135,11 +156,17 @@ class Anchored:
             descriptor_weight=self.growing_weight,
             components=self.components,
         )
-        best = Grown(-1.0, np.empty((0, 0)), np.empty(0, dtype=np.int64))
+        nothing = np.empty(0, dtype=np.int64)
+        best = Grown(-1.0, np.empty((0, 0)), nothing, nothing)
         for start in STARTS[: self.starts]:
-            rows = yield from self._anchored(samples, start)
+            rows = yield from self._anchored(pair, samples, start)
             best = max(best, (yield from self._grown(pair, basis, samples, rows, self.steps)))
             if best.score >= self.enough:
+                break
+        for _ in range(self.repeats if best.score < self.enough else 0):
+            rows = self._settled(samples, samples.on_grid(pair, best.images))
+            before, best = best, max(best, (yield from self._grown(pair, basis, samples, rows, self.steps)))
+            if best.score < before.score + _GAIN:
                 break
         if self.last_steps:
             best = max(best, (yield from self._grown(pair, basis, samples, best.rows, self.last_steps)))
@@ -149,17 +176,27 @@ class Anchored:
             return Correspondence.between_vertices(pair, np.arange(len(nearest)), nearest, confidence)
         return Correspondence.of_every_vertex(pair, found, confidence)
 
-    def _anchored(self, samples: SampledDistances, start: Start) -> Generator[Problem, Solved, IntArray]:
-        """Play one game, and place the samples by its winners and then by one another."""
-        matches = samples.candidates(self.per_sample)
-        payoff = samples.payoff(matches, self.kernel_width * start.kernel_width)
-        share = (yield game("game", payoff, ElasticNet(mix=self.mix * start.mix)))["u"]
-        anchors = matches[matches.greedy(share, floor=self.floor)]
-        weight = self.placing_weight * start.placing_weight
-        images = samples.placed(anchors.part, anchors.full, reach=self.reach, descriptor_weight=weight)
+    def _anchored(self, pair: Pair, samples: SampledDistances, start: Start) -> Generator[Problem, Solved, IntArray]:
+        """Play the games of a start, and place the samples by their winners and then by one another."""
+        width = self.kernel_width * start.kernel_width
+        weight = self.placing_weight
+        if start.peeled:
+            peeling = GameTheoretic(radii=self.radii, part_samples=self.part_samples, kernel_width=width)
+            part, full = (yield from peeling.stages(pair)).view_vertices(pair)
+            on_part, on_full = pair.part.distances(part)[:, samples.points], pair.full.distances(full)[:, samples.grid]
+            images = samples.placed_by(on_part, on_full, reach=self.reach, descriptor_weight=weight)
+        else:
+            matches = samples.candidates(self.per_sample * start.per_sample)
+            share = (yield game("game", samples.payoff(matches, width), ElasticNet(mix=self.mix)))["u"]
+            anchors = matches[matches.greedy(share, floor=self.floor)]
+            images = samples.placed(anchors.part, anchors.full, reach=self.reach, descriptor_weight=weight)
+        return self._settled(samples, images)
+
+    def _settled(self, samples: SampledDistances, images: IntArray) -> IntArray:
+        """Place all samples by those whose images agree best with their neighbours', and again."""
         for _ in range(self.rounds):
             sure = samples.surest(images, self.kept)
-            images = samples.placed(sure, images[sure], reach=self.local_reach, descriptor_weight=weight)
+            images = samples.placed(sure, images[sure], reach=self.local_reach, descriptor_weight=self.placing_weight)
         return images
 
     def _grown(
@@ -169,16 +206,17 @@ class Anchored:
         C, images = yield from grown(
             basis, samples.points, samples.grid[rows], basis.sizes(self.first_size, steps), grid=samples.grid
         )
-        return Grown(float(samples.confidence(pair, samples.points, images, width=KEEPING).mean()), C, rows)
+        return Grown(float(samples.confidence(pair, samples.points, images, width=KEEPING).mean()), C, rows, images)
 
 
 @dataclass(frozen=True, eq=False)
 class Grown:
-    """Hold a functional map, the mean confidence of what is read off it, and the images that it grew from."""
+    """Hold a functional map, the mean confidence of what is read off it, the images it grew from and those read off."""
 
     score: float
     C: FloatArray
     rows: IntArray
+    images: IntArray
 
     def __lt__(self, other: Grown) -> bool:
         return self.score < other.score

@@ -33,7 +33,9 @@ class SampledDistances:
     on_part, on_full
         (s, p) and (g, g) distances, in units of sqrt(full area).
     unlike
-        (p, g) trusted squared differences of descriptors.
+        (p, g) squared differences of descriptors, as far as the part's are trusted.
+    looks
+        (s, g) the same as if all were trusted.
     """
 
     points: IntArray
@@ -41,6 +43,7 @@ class SampledDistances:
     on_part: FloatArray
     on_full: FloatArray
     unlike: FloatArray
+    looks: FloatArray
 
     @property
     def between(self) -> FloatArray:
@@ -48,10 +51,13 @@ class SampledDistances:
         return self.on_part[:, : len(self.on_part)]
 
     def candidates(self, count: int) -> Candidates:
-        """Return, for each of the first samples, the `count` points of the grid with the nearest descriptors."""
-        best = np.argsort(self.unlike[: len(self.on_part)], axis=1, kind="stable")[:, :count]
+        """Return, for each of the first samples, the `count` points of the grid with the nearest descriptors.
+
+        All radii count alike: a look distrusted near a boundary still names more true candidates than it drops.
+        """
+        best = np.argsort(self.looks, axis=1, kind="stable")[:, :count]
         rows = np.repeat(np.arange(len(best)), best.shape[1])
-        return Candidates(rows, best.ravel(), self.unlike[rows, best.ravel()])
+        return Candidates(rows, best.ravel(), self.looks[rows, best.ravel()])
 
     def payoff(self, matches: Candidates, kernel_width: float) -> FloatArray:
         """Return the (n, n) two-sided payoff; see `nonrigid.formulations.distortion.consistency`."""
@@ -62,8 +68,6 @@ class SampledDistances:
     def placed(self, rows: IntArray, images: IntArray, *, reach: float, descriptor_weight: float) -> IntArray:
         """Return, for every sample of the part, the point of the grid where its distances to anchors place it.
 
-        It is the y with the least `placing_cost` + descriptor_weight * unlike(x, y).
-
         Parameters
         ----------
         rows, images
@@ -71,10 +75,26 @@ class SampledDistances:
 
         Returns
         -------
-        (p,) rows of the grid.
+        (p,) rows of the grid; see `placed_by`.
         """
-        cost = placing_cost(self.on_part[rows], self.on_full[images], reach=reach) + descriptor_weight * self.unlike
+        return self.placed_by(
+            self.on_part[rows], self.on_full[images], reach=reach, descriptor_weight=descriptor_weight
+        )
+
+    def placed_by(
+        self, on_part: FloatArray, on_full: FloatArray, *, reach: float, descriptor_weight: float
+    ) -> IntArray:
+        """Return the same for anchors that are no samples, from (a, p) and (a, g) distances to them and their images.
+
+        The place of x is the y with the least `placing_cost` + descriptor_weight * unlike(x, y).
+        """
+        cost = placing_cost(on_part, on_full, reach=reach) + descriptor_weight * self.unlike
         return np.asarray(cost.argmin(axis=1), dtype=np.int64)
+
+    def on_grid(self, pair: Pair, vertices: IntArray) -> IntArray:
+        """Return, for vertices of the full surface, the nearest points of the grid."""
+        places = pair.full.mesh.vertices
+        return np.asarray(cKDTree(places[self.grid]).query(places[vertices])[1], dtype=np.int64)
 
     def disagreement(self, images: IntArray) -> FloatArray:
         """Return, for the first s samples, the mean |d - D| to the others, near ones counting most: a length."""
@@ -94,8 +114,7 @@ class SampledDistances:
         vertices, nearest
             (n,) vertices of the part, the first s samples among them, and a vertex of the full surface for each.
         """
-        samples, places = self.points[: len(self.on_part)], pair.full.mesh.vertices
-        image = np.asarray(cKDTree(places[self.grid]).query(places[nearest])[1], dtype=np.int64)
+        samples, image = self.points[: len(self.on_part)], self.on_grid(pair, nearest)
         row = np.empty(len(pair.part.mesh.vertices), dtype=np.int64)
         row[vertices] = np.arange(len(vertices))
         on_part = pair.part.distances(samples)[:, vertices]
@@ -127,4 +146,5 @@ def sampled_distances(
         on_part=part.distances(points[:part_samples])[:, points],
         on_full=full.distances_between(grid),
         unlike=descriptors.differences(points, grid),
+        looks=descriptors.all_trusted().differences(points[:part_samples], grid),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -28,6 +28,10 @@ class TrustedDescriptors:
     part: tuple[FloatArray, ...]
     full: tuple[FloatArray, ...]
     trust: tuple[FloatArray, ...]
+
+    def all_trusted(self) -> TrustedDescriptors:
+        """Return the same descriptors with full trust in every row."""
+        return replace(self, trust=tuple(np.ones_like(trust) for trust in self.trust))
 
     def queries(self, points: IntArray | slice) -> FloatArray:
         """Return (p, d') rows of the part, whose inner products with `targets` are trusted cosines, mean over radii."""
