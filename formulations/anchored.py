@@ -32,18 +32,17 @@ class Start:
 
     Parameters
     ----------
-    kernel_width, per_sample
-        Factors of the settings of the same name.
+    kernel_width
+        Factor of the setting of the same name.
     peeled
-        Whether the anchors are those of `GameTheoretic`: groups peeled off, merged, and a game near by.
+        Whether the anchors are those of `GameTheoretic` without its second game: groups peeled off, and merged.
     """
 
     kernel_width: float = 1.0
-    per_sample: int = 1
     peeled: bool = False
 
 
-STARTS = (Start(), Start(kernel_width=2 / 3), Start(peeled=True), Start(per_sample=2))
+STARTS = (Start(), Start(kernel_width=2 / 3), Start(peeled=True))
 """Starts in the order in which they are tried."""
 
 
@@ -122,7 +121,7 @@ class Anchored:
     steps: int = 5
     last_steps: int = 20
     components: int = 80
-    starts: int = 4
+    starts: int = 3
     enough: float = 0.85
     repeats: int = 3
     part_size: int = 100
@@ -181,12 +180,14 @@ class Anchored:
         width = self.kernel_width * start.kernel_width
         weight = self.placing_weight
         if start.peeled:
-            peeling = GameTheoretic(radii=self.radii, part_samples=self.part_samples, kernel_width=width)
+            peeling = GameTheoretic(
+                radii=self.radii, part_samples=self.part_samples, kernel_width=width, local_candidates=0
+            )
             part, full = (yield from peeling.stages(pair)).view_vertices(pair)
             on_part, on_full = pair.part.distances(part)[:, samples.points], pair.full.distances(full)[:, samples.grid]
             images = samples.placed_by(on_part, on_full, reach=self.reach, descriptor_weight=weight)
         else:
-            matches = samples.candidates(self.per_sample * start.per_sample)
+            matches = samples.candidates(self.per_sample)
             share = (yield game("game", samples.payoff(matches, width), ElasticNet(mix=self.mix)))["u"]
             anchors = matches[matches.greedy(share, floor=self.floor)]
             images = samples.placed(anchors.part, anchors.full, reach=self.reach, descriptor_weight=weight)

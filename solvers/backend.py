@@ -6,7 +6,7 @@ import importlib
 import pkgutil
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib.metadata import entry_points
+from importlib.metadata import entry_points, version
 from typing import Any, ClassVar, Protocol
 
 from nonrigid.formulations.model import Problem
@@ -64,6 +64,15 @@ class Backend(Protocol):
     @classmethod
     def versions(cls) -> dict[str, str]:
         """Return the versions of the library and of the native solvers it holds."""
+
+
+@cache
+def library_version(distribution: str) -> str:
+    """Return the version of an installed distribution; every solution names some, and each is looked up once.
+
+    Raises `importlib.metadata.PackageNotFoundError` where there is none.
+    """
+    return version(distribution)
 
 
 def backend_names() -> tuple[str, ...]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
-from importlib.metadata import version
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,7 +15,7 @@ from nonrigid.formulations.model import Curvature, Problem
 from nonrigid.formulations.model.binary_sets import integral_entries
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.acceptance import Acceptance, Bridge, Native, Refused, Via
-from nonrigid.solvers.backend import Raw
+from nonrigid.solvers.backend import Raw, library_version
 from nonrigid.solvers.bridges.hull import ToHull
 from nonrigid.solvers.bridges.pair_lift import PairLift
 from nonrigid.solvers.bridges.polar import Polar
@@ -110,7 +109,7 @@ class Scipy:
     @classmethod
     def versions(cls) -> dict[str, str]:
         """Return the version of SciPy."""
-        return {"scipy": version("scipy")}
+        return {"scipy": library_version("scipy")}
 
 
 def _options(algorithm: str, limits: Limits) -> dict[str, Any]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import io
 from dataclasses import dataclass
-from importlib.metadata import version
 from typing import Any, ClassVar
 
 import casadi as ca
@@ -15,7 +14,7 @@ from nonrigid.formulations.model import Problem
 from nonrigid.formulations.model.binary_sets import integral_entries
 from nonrigid.geometry.arrays import BoolArray, FloatArray
 from nonrigid.solvers.acceptance import Acceptance, Bridge, Native, Refused, Via, via
-from nonrigid.solvers.backend import Raw
+from nonrigid.solvers.backend import Raw, library_version
 from nonrigid.solvers.backends.casadi.functions import StopAsked
 from nonrigid.solvers.backends.casadi.settings import QP_PLUGINS, solver_options
 from nonrigid.solvers.backends.casadi.transcription import second_order_obstacle, transcribe
@@ -140,7 +139,7 @@ class Casadi:
     @classmethod
     def versions(cls) -> dict[str, str]:
         """Return the version of CasADi, which carries its solvers."""
-        return {"casadi": version("casadi")}
+        return {"casadi": library_version("casadi")}
 
 
 def _integral(problem: Problem) -> BoolArray:

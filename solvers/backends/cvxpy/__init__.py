@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib.metadata import version
 from typing import Any, ClassVar
 
 import cvxpy
@@ -15,7 +14,7 @@ from nonrigid.formulations.model.stiefel import Stiefel
 from nonrigid.formulations.model.terms.group_norm import GroupNorm21
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.acceptance import Acceptance, Native, Refused, Via, via
-from nonrigid.solvers.backend import Raw
+from nonrigid.solvers.backend import Raw, library_version
 from nonrigid.solvers.backends.cvxpy.lowering import Lowered, is_convex, set_obstacle, size_of, solve_quietly
 from nonrigid.solvers.backends.cvxpy.settings import CONIC, NONLINEAR, QUADRATIC, convex_options, nonlinear_options
 from nonrigid.solvers.backends.cvxpy.successive import successive
@@ -107,7 +106,7 @@ class Cvxpy:
     @classmethod
     def versions(cls) -> dict[str, str]:
         """Return the versions of CVXPY and of the solvers it drives."""
-        return {name: version(name) for name in ("cvxpy", *_PACKAGES.values(), "unopy")}
+        return {name: library_version(name) for name in ("cvxpy", *_PACKAGES.values(), "unopy")}
 
     def _once(self, program: Any, lowered: Lowered, oracle: Oracle, limits: Limits) -> Raw:
         program.get_problem_data(self.algorithm)

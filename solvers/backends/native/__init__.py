@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from importlib.metadata import version
 from importlib.util import find_spec
 from typing import ClassVar
 
@@ -11,7 +10,7 @@ from nonrigid.formulations.model import Problem
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.acceptance import Acceptance, Refused
 from nonrigid.solvers.acceptance import Native as TakenAsIs
-from nonrigid.solvers.backend import Raw
+from nonrigid.solvers.backend import Raw, library_version
 from nonrigid.solvers.backends.native.conditional_gradient import (
     conditional_gradient,
     conditional_gradient_pot,
@@ -139,8 +138,8 @@ class Native:
     @classmethod
     def versions(cls) -> dict[str, str]:
         """Return the versions of what the numbers depend on."""
-        found = {name: version(name) for name in ("nonrigid", "numpy", "scipy")}
-        return found if find_spec("ot") is None else {**found, "pot": version("pot")}
+        found = {name: library_version(name) for name in ("nonrigid", "numpy", "scipy")}
+        return found if find_spec("ot") is None else {**found, "pot": library_version("pot")}
 
 
 def _search_obstacle(algorithm: str, problem: Problem) -> str | None:
