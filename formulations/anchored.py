@@ -66,6 +66,9 @@ class Anchored:
     ----------
     radii
         Radii of the SHOT descriptors, in units of sqrt(full area).
+    geodesics
+        How distances are measured; see `nonrigid.geometry.geodesics.make_geodesics`. "bridged" ones may cross what was
+        cut out, and come nearer to those before the cut.
     trust_power
         Power of the fall of trust in descriptors near the part's boundary; 0 for full trust everywhere.
     part_samples, full_samples, per_sample
@@ -103,6 +106,7 @@ class Anchored:
     """
 
     radii: tuple[float, ...] = (0.04, 0.10)
+    geodesics: str = "bridged"
     trust_power: float = 1.0
     part_samples: int = 300
     full_samples: int = 1500
@@ -146,6 +150,7 @@ class Anchored:
             part_samples=self.part_samples,
             placed_samples=self.fitted_samples,
             full_samples=self.full_samples,
+            geodesics=self.geodesics,
         )
         basis = bases(
             pair,
@@ -181,10 +186,15 @@ class Anchored:
         weight = self.placing_weight
         if start.peeled:
             peeling = GameTheoretic(
-                radii=self.radii, part_samples=self.part_samples, kernel_width=width, local_candidates=0
+                radii=self.radii,
+                part_samples=self.part_samples,
+                kernel_width=width,
+                geodesics=self.geodesics,
+                local_candidates=0,
             )
             part, full = (yield from peeling.stages(pair)).view_vertices(pair)
-            on_part, on_full = pair.part.distances(part)[:, samples.points], pair.full.distances(full)[:, samples.grid]
+            on_part = pair.part.distances(part, self.geodesics)[:, samples.points]
+            on_full = pair.full.distances(full, self.geodesics)[:, samples.grid]
             images = samples.placed_by(on_part, on_full, reach=self.reach, descriptor_weight=weight)
         else:
             matches = samples.candidates(self.per_sample)

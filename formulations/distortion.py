@@ -22,6 +22,7 @@ def distortion(
     *,
     sides: Sides = "two-sided",
     excess_weight: float = 0.3,
+    geodesics: str = "dijkstra",
     keep: bool = True,
 ) -> FloatArray:
     """Return (n, n) disagreements of pairs of matches, in units of sqrt(full area).
@@ -29,7 +30,7 @@ def distortion(
     With d and D the geodesic distances on the part and on the full surface, "two-sided" is |d - D|. A path that the cut
     removed can only make d longer, never shorter, than the true D; so "one-sided" is max(0, D - d) + excess_weight *
     max(0, d - D), and "certified" is two-sided for pairs of points whose distance the cut provably left alone,
-    one-sided for the others.
+    one-sided for the others. `geodesics` says how both are measured: "bridged" ones may cross what was cut out.
 
     `keep=False` says that these candidates' distances will not be asked for again, and are not worth a place in the
     cache.
@@ -45,9 +46,9 @@ def distortion(
         raise InputError(f"excess_weight is {excess_weight}", remedy="give a number between 0 and 1")
     part, of_part = _distinct(matches.part)
     full, of_full = _distinct(matches.full)
-    on_part = pair.part.distances_between(part)
+    on_part = pair.part.distances_between(part, geodesics)
     excess = on_part[np.ix_(of_part, of_part)]
-    excess -= pair.full.distances_between(full, keep=keep)[np.ix_(of_full, of_full)]
+    excess -= pair.full.distances_between(full, geodesics, keep=keep)[np.ix_(of_full, of_full)]
     if sides == "two-sided":
         return np.abs(excess, out=excess)
     weight = np.full(on_part.shape, excess_weight)
@@ -66,6 +67,7 @@ def consistency(
     kernel_width: float = 0.03,
     sides: Sides = "two-sided",
     excess_weight: float = 0.3,
+    geodesics: str = "dijkstra",
     keep: bool = True,
 ) -> FloatArray:
     """Return the (n, n) payoff of pairs of matches: 1 for perfect agreement, 1/2 at a distortion of `kernel_width`.
@@ -85,7 +87,9 @@ def consistency(
             f"kernel_width is {kernel_width}", remedy="give a length in units of sqrt(full area), e.g. 0.03"
         )
     return payoff_of(
-        distortion(pair, matches, sides=sides, excess_weight=excess_weight, keep=keep), matches, kernel_width
+        distortion(pair, matches, sides=sides, excess_weight=excess_weight, geodesics=geodesics, keep=keep),
+        matches,
+        kernel_width,
     )
 
 

@@ -26,6 +26,9 @@ class GameSettings:
         Candidates of the first game; see `nonrigid.formulations.candidates.candidate_matches`.
     sides, excess_weight
         Which distortion; see `nonrigid.formulations.distortion.distortion`.
+    geodesics
+        How distances on the part and on the full surface are measured; see
+        `nonrigid.geometry.geodesics.make_geodesics`. Published: plain ones, as "dijkstra".
     local_candidates
         Candidates of each sample in the second game; 0 for no second game.
     local_reach
@@ -39,6 +42,7 @@ class GameSettings:
     radii: tuple[float, ...] = (0.04, 0.10)
     sides: Sides = "two-sided"
     excess_weight: float = 0.3
+    geodesics: str = "bridged"
     local_candidates: int = 6
     local_reach: float = 0.15
 
@@ -63,6 +67,7 @@ def local_players(settings: GameSettings, pair: Pair, matches: Candidates, ancho
         count=settings.local_candidates,
         farthest=settings.local_reach,
         radii=settings.radii,
+        geodesics=settings.geodesics,
     )
 
 
@@ -74,6 +79,7 @@ def payoffs(settings: GameSettings, pair: Pair, matches: Candidates, *, keep: bo
         kernel_width=settings.kernel_width,
         sides=settings.sides,
         excess_weight=settings.excess_weight,
+        geodesics=settings.geodesics,
         keep=keep,
     )
 

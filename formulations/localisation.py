@@ -17,6 +17,7 @@ def multilateration_cost(
     reach: float,
     descriptor_weight: float,
     radii: tuple[float, ...],
+    geodesics: str = "dijkstra",
 ) -> FloatArray:
     """Return, for vertices of the part and all vertices of the full surface, how badly they fit as a match.
 
@@ -32,12 +33,15 @@ def multilateration_cost(
         Distance at which an anchor counts 1/e, in units of sqrt(full area).
     descriptor_weight
         Weight of the squared difference of unit SHOT rows (0 to 4) against squared lengths.
+    geodesics
+        How distances are measured; see `nonrigid.geometry.geodesics.make_geodesics`.
 
     Returns
     -------
     (p, n_full), in units of the full area.
     """
-    cost = placing_cost(pair.part.distances(anchors.part)[:, points], pair.full.distances(anchors.full), reach=reach)
+    on_part = pair.part.distances(anchors.part, geodesics)[:, points]
+    cost = placing_cost(on_part, pair.full.distances(anchors.full, geodesics), reach=reach)
     rows, columns = describe(pair.part, radii)[points], describe(pair.full, radii)
     cost += descriptor_weight * (2.0 - 2.0 * rows @ columns.T)
     return np.asarray(cost)
@@ -77,6 +81,7 @@ def local_matches(
     radii: tuple[float, ...],
     reach: float = 0.25,
     descriptor_weight: float = 0.02,
+    geodesics: str = "dijkstra",
 ) -> Candidates:
     """Return, for points of the part near an anchor, the `count` vertices of the full surface that fit best.
 
@@ -86,12 +91,14 @@ def local_matches(
         (p,) vertices of the part.
     farthest
         Points farther than this from every anchor are left out, in units of sqrt(full area).
-    reach, descriptor_weight, radii
+    reach, descriptor_weight, radii, geodesics
         See `multilateration_cost`.
     """
-    near = pair.part.distances(anchors.part)[:, points].min(axis=0) <= farthest
+    near = pair.part.distances(anchors.part, geodesics)[:, points].min(axis=0) <= farthest
     points = points[near]
-    cost = multilateration_cost(pair, points, anchors, reach=reach, descriptor_weight=descriptor_weight, radii=radii)
+    cost = multilateration_cost(
+        pair, points, anchors, reach=reach, descriptor_weight=descriptor_weight, radii=radii, geodesics=geodesics
+    )
     count = min(count, cost.shape[1])
     best = np.sort(np.argpartition(cost, count - 1, axis=1)[:, :count], axis=1)
     return Candidates(np.repeat(points, count), best.ravel(), np.take_along_axis(cost, best, axis=1).ravel())

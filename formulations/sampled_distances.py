@@ -36,6 +36,8 @@ class SampledDistances:
         (p, g) squared differences of descriptors, as far as the part's are trusted.
     looks
         (s, g) the same as if all were trusted.
+    geodesics
+        How distances are measured; see `nonrigid.geometry.geodesics.make_geodesics`.
     """
 
     points: IntArray
@@ -44,6 +46,7 @@ class SampledDistances:
     on_full: FloatArray
     unlike: FloatArray
     looks: FloatArray
+    geodesics: str = "dijkstra"
 
     @property
     def between(self) -> FloatArray:
@@ -117,7 +120,7 @@ class SampledDistances:
         samples, image = self.points[: len(self.on_part)], self.on_grid(pair, nearest)
         row = np.empty(len(pair.part.mesh.vertices), dtype=np.int64)
         row[vertices] = np.arange(len(vertices))
-        on_part = pair.part.distances(samples)[:, vertices]
+        on_part = pair.part.distances(samples, self.geodesics)[:, vertices]
         weight = np.exp(-np.square(on_part / NEAR))
         off = np.abs(on_part - self.on_full[np.ix_(image[row[samples]], image)])
         mean = (weight * off).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-300)
@@ -130,7 +133,13 @@ class SampledDistances:
 
 
 def sampled_distances(
-    pair: Pair, descriptors: TrustedDescriptors, *, part_samples: int, placed_samples: int, full_samples: int
+    pair: Pair,
+    descriptors: TrustedDescriptors,
+    *,
+    part_samples: int,
+    placed_samples: int,
+    full_samples: int,
+    geodesics: str = "dijkstra",
 ) -> SampledDistances:
     """Sample both surfaces and measure; a surface with too few vertices gives all of them.
 
@@ -143,8 +152,9 @@ def sampled_distances(
     return SampledDistances(
         points=points,
         grid=grid,
-        on_part=part.distances(points[:part_samples])[:, points],
-        on_full=full.distances_between(grid),
+        on_part=part.distances(points[:part_samples], geodesics)[:, points],
+        on_full=full.distances_between(grid, geodesics),
         unlike=descriptors.differences(points, grid),
         looks=descriptors.all_trusted().differences(points[:part_samples], grid),
+        geodesics=geodesics,
     )

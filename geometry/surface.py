@@ -141,16 +141,15 @@ class Surface:
     def distances(self, sources: ArrayLike, method: str = "dijkstra") -> FloatArray:
         """Return the (s, n) distances along the surface from `sources` to every vertex, in the unit of the vertices.
 
-        `method` is "dijkstra", "heat" or "exact"; see `nonrigid.geometry.geodesics`. Answers larger than
+        `method` is "dijkstra", "bridged", "heat" or "exact"; see `nonrigid.geometry.geodesics`. Answers larger than
         `LARGEST_STORED` are not kept.
         """
-        wanted = np.asarray(sources, dtype=np.int64).reshape(-1)
+        wanted, method = np.asarray(sources, dtype=np.int64).reshape(-1), self._same_as(method)
         ascending, place = np.unique(wanted, return_inverse=True)
         key = ("distances", method, ascending)
 
         def fresh() -> dict[str, FloatArray]:
-            made = self._remember(f"geodesics {method}", lambda: make_geodesics(self.mesh, method))
-            return {"rows": made.distances(ascending)}
+            return {"rows": self._geodesics(method).distances(ascending)}
 
         if ascending.size * len(self.mesh.vertices) * 8 > LARGEST_STORED:
             large: FloatArray = _frozen(fresh()["rows"][place])
@@ -164,7 +163,7 @@ class Surface:
         The rows are computed a block at a time, so that memory stays small. `keep=False` says that another run will
         hardly ask for these vertices: the answer is then kept in memory only.
         """
-        wanted = np.asarray(vertices, dtype=np.int64).reshape(-1)
+        wanted, method = np.asarray(vertices, dtype=np.int64).reshape(-1), self._same_as(method)
         ascending, place = np.unique(wanted, return_inverse=True)
         key = ("between", method, ascending)
 
@@ -181,6 +180,10 @@ class Surface:
     def scaled(self, factor: float) -> Surface:
         """Return the surface with all lengths multiplied by `factor`, with the same cache."""
         return Surface(self.raw.transformed(scale=factor), cache=self._cache)
+
+    def _same_as(self, method: str) -> str:
+        """Return the simplest method with the same answers, so that they are kept once."""
+        return "dijkstra" if method == "bridged" and not len(self.mesh.boundary_edges) else method
 
     def _geodesics(self, method: str) -> Geodesics:
         return self._remember(f"geodesics {method}", lambda: make_geodesics(self.mesh, method))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from nonrigid.geometry.errors import UnknownNameError
+from nonrigid.geometry.geodesics.bridged import BridgedGeodesics
 from nonrigid.geometry.geodesics.dijkstra import DijkstraGeodesics, virtual_edge_graph
 from nonrigid.geometry.geodesics.edge_flip import EdgeFlip
 from nonrigid.geometry.geodesics.exact import ExactGeodesics
@@ -15,6 +16,7 @@ from nonrigid.geometry.mesh import Mesh
 
 __all__ = [
     "METHODS",
+    "BridgedGeodesics",
     "DijkstraGeodesics",
     "EdgeFlip",
     "ExactGeodesics",
@@ -27,13 +29,14 @@ __all__ = [
 
 METHODS: dict[str, Callable[[Mesh], Geodesics]] = {
     "dijkstra": DijkstraGeodesics,
+    "bridged": BridgedGeodesics,
     "heat": HeatGeodesics,
     "exact": ExactGeodesics,
 }
 
 
 def make_geodesics(mesh: Mesh, method: str) -> Geodesics:
-    """Return the solver for `mesh` that `method` names: "dijkstra", "heat" or "exact".
+    """Return the solver for `mesh` that `method` names: "dijkstra", "bridged", "heat" or "exact".
 
     Raises
     ------

@@ -59,11 +59,11 @@ def virtual_edge_graph(mesh: Mesh) -> csr_array:
     """
     edges = mesh.edges
     lengths = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
-    ends, across = _virtual_edges(mesh)
-    return _symmetric_graph(np.vstack([edges, ends]), np.concatenate([lengths, across]), len(mesh.vertices))
+    ends, across = virtual_edges(mesh)
+    return symmetric_graph(np.vstack([edges, ends]), np.concatenate([lengths, across]), len(mesh.vertices))
 
 
-def _virtual_edges(mesh: Mesh) -> tuple[IntArray, FloatArray]:
+def virtual_edges(mesh: Mesh) -> tuple[IntArray, FloatArray]:
     """Return the (v, 2) opposite corners that see each other across an edge, and the (v,) unfolded lengths."""
     a, b, c, d = _hinges(mesh)
     shared = mesh.vertices[b] - mesh.vertices[a]
@@ -97,7 +97,7 @@ def _hinges(mesh: Mesh) -> tuple[IntArray, IntArray, IntArray, IntArray]:
     return edges[hinge, 0], edges[hinge, 1], opposite[hinge], opposite[hinge + 1]
 
 
-def _symmetric_graph(ends: IntArray, lengths: FloatArray, count: int) -> csr_array:
+def symmetric_graph(ends: IntArray, lengths: FloatArray, count: int) -> csr_array:
     """Return the graph with both directions of each edge; of parallel edges the shortest, never their sum."""
     ends, lengths = ends[ends[:, 0] != ends[:, 1]], lengths[ends[:, 0] != ends[:, 1]]
     order = np.lexsort((lengths, ends[:, 1], ends[:, 0]))

@@ -36,7 +36,7 @@ def sphere() -> Mesh:
 
 PLANE, SPHERE = plane(), sphere()
 # (mean, largest) relative error allowed on a plane; exact is exact
-PLANAR_ERROR = {"exact": (1e-12, 1e-9), "dijkstra": (0.03, 0.12), "heat": (0.05, 0.5)}
+PLANAR_ERROR = {"exact": (1e-12, 1e-9), "dijkstra": (0.03, 0.12), "bridged": (0.03, 0.12), "heat": (0.05, 0.5)}
 
 
 @pytest.mark.parametrize("method", sorted(METHODS))
@@ -69,7 +69,7 @@ def test_dijkstra_is_an_upper_bound_tighter_than_edges_alone(mesh: Mesh) -> None
     assert found.mean() < 1.06 * exact.mean()
 
 
-@pytest.mark.parametrize("method", ["dijkstra", "exact"])
+@pytest.mark.parametrize("method", ["dijkstra", "bridged", "exact"])
 def test_distances_are_a_metric(method: str) -> None:
     d = make_geodesics(PLANE, method).distances(np.arange(144))
     assert (np.diag(d) == 0).all()
@@ -123,7 +123,7 @@ def test_what_would_crash_a_solver_is_refused(fault: str, make: object) -> None:
 
 
 def test_bad_names_and_numbers_are_refused() -> None:
-    with pytest.raises(UnknownNameError, match=r"fast marching.*dijkstra, exact, heat"):
+    with pytest.raises(UnknownNameError, match=r"fast marching.*bridged, dijkstra, exact, heat"):
         make_geodesics(PLANE, "fast marching")
     for method in METHODS:
         solver = make_geodesics(PLANE, method)
