@@ -34,15 +34,18 @@ class Start:
     ----------
     kernel_width
         Factor of the setting of the same name.
+    bridged
+        Whether the game's distances on the part may cross what was cut out; all others go along it.
     peeled
         Whether the anchors are those of `GameTheoretic` without its second game: groups peeled off, and merged.
     """
 
     kernel_width: float = 1.0
+    bridged: bool = True
     peeled: bool = False
 
 
-STARTS = (Start(), Start(kernel_width=2 / 3), Start(peeled=True))
+STARTS = (Start(), Start(kernel_width=2 / 3, bridged=False), Start(peeled=True), Start(bridged=False))
 """Starts in the order in which they are tried."""
 
 
@@ -66,9 +69,6 @@ class Anchored:
     ----------
     radii
         Radii of the SHOT descriptors, in units of sqrt(full area).
-    geodesics
-        How distances are measured; see `nonrigid.geometry.geodesics.make_geodesics`. "bridged" ones may cross what was
-        cut out, and come nearer to those before the cut.
     trust_power
         Power of the fall of trust in descriptors near the part's boundary; 0 for full trust everywhere.
     part_samples, full_samples, per_sample
@@ -106,7 +106,6 @@ class Anchored:
     """
 
     radii: tuple[float, ...] = (0.04, 0.10)
-    geodesics: str = "bridged"
     trust_power: float = 1.0
     part_samples: int = 300
     full_samples: int = 1500
@@ -125,7 +124,7 @@ class Anchored:
     steps: int = 5
     last_steps: int = 20
     components: int = 80
-    starts: int = 3
+    starts: int = 4
     enough: float = 0.85
     repeats: int = 3
     part_size: int = 100
@@ -150,7 +149,6 @@ class Anchored:
             part_samples=self.part_samples,
             placed_samples=self.fitted_samples,
             full_samples=self.full_samples,
-            geodesics=self.geodesics,
         )
         basis = bases(
             pair,
@@ -189,16 +187,18 @@ class Anchored:
                 radii=self.radii,
                 part_samples=self.part_samples,
                 kernel_width=width,
-                geodesics=self.geodesics,
+                geodesics="bridged" if start.bridged else "dijkstra",
                 local_candidates=0,
             )
             part, full = (yield from peeling.stages(pair)).view_vertices(pair)
-            on_part = pair.part.distances(part, self.geodesics)[:, samples.points]
-            on_full = pair.full.distances(full, self.geodesics)[:, samples.grid]
+            on_part = pair.part.distances(part)[:, samples.points]
+            on_full = pair.full.distances(full)[:, samples.grid]
             images = samples.placed_by(on_part, on_full, reach=self.reach, descriptor_weight=weight)
         else:
             matches = samples.candidates(self.per_sample)
-            share = (yield game("game", samples.payoff(matches, width), ElasticNet(mix=self.mix)))["u"]
+            share = (
+                yield game("game", samples.payoff(matches, width, bridged=start.bridged), ElasticNet(mix=self.mix))
+            )["u"]
             anchors = matches[matches.greedy(share, floor=self.floor)]
             images = samples.placed(anchors.part, anchors.full, reach=self.reach, descriptor_weight=weight)
         return self._settled(samples, images)

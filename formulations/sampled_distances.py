@@ -36,8 +36,9 @@ class SampledDistances:
         (p, g) squared differences of descriptors, as far as the part's are trusted.
     looks
         (s, g) the same as if all were trusted.
-    geodesics
-        How distances are measured; see `nonrigid.geometry.geodesics.make_geodesics`.
+    across
+        (s, s) distances between the first s samples by ways that may cross what was cut out; see
+        `nonrigid.geometry.geodesics.BridgedGeodesics`.
     """
 
     points: IntArray
@@ -46,7 +47,7 @@ class SampledDistances:
     on_full: FloatArray
     unlike: FloatArray
     looks: FloatArray
-    geodesics: str = "dijkstra"
+    across: FloatArray
 
     @property
     def between(self) -> FloatArray:
@@ -62,9 +63,13 @@ class SampledDistances:
         rows = np.repeat(np.arange(len(best)), best.shape[1])
         return Candidates(rows, best.ravel(), self.looks[rows, best.ravel()])
 
-    def payoff(self, matches: Candidates, kernel_width: float) -> FloatArray:
-        """Return the (n, n) two-sided payoff; see `nonrigid.formulations.distortion.consistency`."""
-        excess = self.on_part[np.ix_(matches.part, matches.part)]
+    def payoff(self, matches: Candidates, kernel_width: float, *, bridged: bool) -> FloatArray:
+        """Return the (n, n) two-sided payoff; see `nonrigid.formulations.distortion.consistency`.
+
+        `bridged`: distances on the part are `across`, else those along it.
+        """
+        between = self.across if bridged else self.between
+        excess = between[np.ix_(matches.part, matches.part)]
         excess -= self.on_full[np.ix_(matches.full, matches.full)]
         return payoff_of(excess, matches, kernel_width)
 
@@ -120,7 +125,7 @@ class SampledDistances:
         samples, image = self.points[: len(self.on_part)], self.on_grid(pair, nearest)
         row = np.empty(len(pair.part.mesh.vertices), dtype=np.int64)
         row[vertices] = np.arange(len(vertices))
-        on_part = pair.part.distances(samples, self.geodesics)[:, vertices]
+        on_part = pair.part.distances(samples)[:, vertices]
         weight = np.exp(-np.square(on_part / NEAR))
         off = np.abs(on_part - self.on_full[np.ix_(image[row[samples]], image)])
         mean = (weight * off).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-300)
@@ -139,7 +144,6 @@ def sampled_distances(
     part_samples: int,
     placed_samples: int,
     full_samples: int,
-    geodesics: str = "dijkstra",
 ) -> SampledDistances:
     """Sample both surfaces and measure; a surface with too few vertices gives all of them.
 
@@ -152,9 +156,9 @@ def sampled_distances(
     return SampledDistances(
         points=points,
         grid=grid,
-        on_part=part.distances(points[:part_samples], geodesics)[:, points],
-        on_full=full.distances_between(grid, geodesics),
+        on_part=part.distances(points[:part_samples])[:, points],
+        on_full=full.distances_between(grid),
         unlike=descriptors.differences(points, grid),
         looks=descriptors.all_trusted().differences(points[:part_samples], grid),
-        geodesics=geodesics,
+        across=part.distances_between(points[:part_samples], "bridged"),
     )
