@@ -32,8 +32,8 @@ class Start:
 
     Parameters
     ----------
-    kernel_width
-        Factor of the setting of the same name.
+    kernel_width, mix, per_sample
+        Factors of the settings of the same name.
     bridged
         Whether the game's distances on the part may cross what was cut out; all others go along it.
     peeled
@@ -41,12 +41,17 @@ class Start:
     """
 
     kernel_width: float = 1.0
+    mix: float = 1.0
+    per_sample: int = 1
     bridged: bool = True
     peeled: bool = False
 
 
 STARTS = (Start(), Start(kernel_width=2 / 3, bridged=False), Start(peeled=True), Start(bridged=False))
 """Starts in the order in which they are tried."""
+
+LAST_STARTS = (Start(kernel_width=2 / 3, mix=0.6), Start(mix=1.6, per_sample=2))
+"""Starts that are tried where these leave the best map unsure: few anchors, and many."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +98,9 @@ class Anchored:
         Largest number of starts, and the mean confidence at which no other is tried; the one with the highest mean
         confidence wins.
     repeats
-        How often, at most, an unsure map's images become anchors again.
+        How often, at most, the images of a map that is not sure enough become anchors again.
+    unsure
+        Mean confidence below which `LAST_STARTS` are tried too.
     part_size, full_size
         Largest numbers of eigenfunctions.
     between_vertices
@@ -127,6 +134,7 @@ class Anchored:
     starts: int = 4
     enough: float = 0.85
     repeats: int = 3
+    unsure: float = 0.7
     part_size: int = 100
     full_size: int = 200
     between_vertices: bool = True
@@ -165,11 +173,11 @@ class Anchored:
             best = max(best, (yield from self._grown(pair, basis, samples, rows, self.steps)))
             if best.score >= self.enough:
                 break
-        for _ in range(self.repeats if best.score < self.enough else 0):
-            rows = self._settled(samples, samples.on_grid(pair, best.images))
-            before, best = best, max(best, (yield from self._grown(pair, basis, samples, rows, self.steps)))
-            if best.score < before.score + _GAIN:
-                break
+        best = yield from self._repeated(pair, basis, samples, best)
+        for start in LAST_STARTS if best.score < self.unsure else ():
+            rows = yield from self._anchored(pair, samples, start)
+            other = yield from self._grown(pair, basis, samples, rows, self.steps)
+            best = max(best, (yield from self._repeated(pair, basis, samples, other)))
         if self.last_steps:
             best = max(best, (yield from self._grown(pair, basis, samples, best.rows, self.last_steps)))
         found, nearest = basis.read_off(best.C, pair.full.mesh)
@@ -195,9 +203,13 @@ class Anchored:
             on_full = pair.full.distances(full)[:, samples.grid]
             images = samples.placed_by(on_part, on_full, reach=self.reach, descriptor_weight=weight)
         else:
-            matches = samples.candidates(self.per_sample)
+            matches = samples.candidates(self.per_sample * start.per_sample)
             share = (
-                yield game("game", samples.payoff(matches, width, bridged=start.bridged), ElasticNet(mix=self.mix))
+                yield game(
+                    "game",
+                    samples.payoff(matches, width, bridged=start.bridged),
+                    ElasticNet(mix=min(self.mix * start.mix, 1.0)),
+                )
             )["u"]
             anchors = matches[matches.greedy(share, floor=self.floor)]
             images = samples.placed(anchors.part, anchors.full, reach=self.reach, descriptor_weight=weight)
@@ -209,6 +221,17 @@ class Anchored:
             sure = samples.surest(images, self.kept)
             images = samples.placed(sure, images[sure], reach=self.local_reach, descriptor_weight=self.placing_weight)
         return images
+
+    def _repeated(
+        self, pair: Pair, basis: Bases, samples: SampledDistances, best: Grown
+    ) -> Generator[Problem, Solved, Grown]:
+        """Grow a map again from its own images, placed anew, while that makes it surer."""
+        for _ in range(self.repeats if best.score < self.enough else 0):
+            rows = self._settled(samples, samples.on_grid(pair, best.images))
+            before, best = best, max(best, (yield from self._grown(pair, basis, samples, rows, self.steps)))
+            if best.score < before.score + _GAIN:
+                break
+        return best
 
     def _grown(
         self, pair: Pair, basis: Bases, samples: SampledDistances, rows: IntArray, steps: int
