@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import groupby
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from scipy.stats import ortho_group
 from nonrigid.benchmark.datasets.protocols import PairData
 from nonrigid.benchmark.datasets.shrec16 import Shrec16
 from nonrigid.benchmark.protocol import random_rigid_motion, score
-from nonrigid.formulations.anchored import Anchored
+from nonrigid.formulations.anchored import LAST_STARTS, STARTS, Anchored
 from nonrigid.formulations.formulation import Correspondence, Pair
 from nonrigid.formulations.interpolation import closest_feature_points
 from nonrigid.formulations.spectral_growth import bases, map_fit
@@ -98,6 +99,22 @@ def test_order_frame_and_scale_change_nothing(creature: PairData, matched: Corre
         before = matched.dense(len(part.vertices)).positions(full)
         apart = np.linalg.norm(back - before, axis=1) / np.sqrt(full.area)
         assert np.quantile(apart, 0.99) < 1e-3
+
+
+def test_a_map_that_stays_unsure_is_started_in_every_way(creature: PairData) -> None:
+    part = random_rigid_motion(creature.part)[0]
+    hopeless = replace(SMALL, starts=len(STARTS), enough=2.0, unsure=2.0, repeats=1, steps=2, last_steps=0)
+    named = [solution.problem for solution in match(Pair.of(part, creature.full), hopeless).solutions]
+    groups = [len(list(run)) for name, run in groupby(named) if name == "game"]
+    assert len(groups) == len(STARTS) + len(LAST_STARTS)
+    assert groups[2] >= 1  # groups peeled off one after another
+    assert named.count("map") == 2 * (
+        len(groups) + 1 + len(LAST_STARTS)
+    )  # once a start, once more the best and the last
+    sure = [
+        solution.problem for solution in match(Pair.of(part, creature.full), replace(hopeless, enough=0.0)).solutions
+    ]
+    assert sure[:3] == ["game", "map", "map"]
 
 
 @pytest.mark.realdata

@@ -29,7 +29,7 @@ from nonrigid.formulations.model.terms.group_norm import GroupNorm21
 from nonrigid.formulations.model.terms.masked_data import MaskedBasis, MaskedData, MaskedTarget
 from nonrigid.formulations.model.terms.mumford_shah import MumfordShah
 from nonrigid.formulations.model.terms.weighted_squares import WeightedSquares
-from nonrigid.formulations.partial_functional import Bases, PartialFunctionalMap, Start
+from nonrigid.formulations.partial_functional import Bases, PartialFunctionalMap, Start, _State
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.geometry.errors import InputError, UnknownNameError
 from nonrigid.geometry.mesh import Mesh
@@ -232,6 +232,26 @@ def test_the_start_whose_step_in_c_ends_lowest_goes_on(pair: Pair) -> None:
     both = PartialFunctionalMap(start_radii=())
     with pytest.raises(InputError, match="start_radii is empty"):
         match(pair, both)
+
+
+def test_starts_that_tie_and_differ_go_on_and_the_others_do_not(pair: Pair) -> None:
+    bases = Bases.of(pair, SMALL.eigenfunctions, SMALL.closest_point_samples)
+    right, other = np.eye(bases.size), np.diag((-1.0) ** np.arange(bases.size))
+    tried = [
+        _State(C=other, v=np.ones(1), energy=1.04),
+        _State(C=right, v=np.ones(1), energy=1.0),
+        _State(C=right, v=np.ones(1), energy=1.01),
+        _State(C=-right, v=np.ones(1), energy=1.2),
+    ]
+    assert bases.contenders(tried) == [tried[1], tried[0]]
+    assert bases.contenders(tried[2:]) == [tried[2]]
+
+
+def test_the_end_with_the_lowest_energy_is_the_answer(pair: Pair, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("nonrigid.formulations.partial_functional._NEAR", np.inf)
+    monkeypatch.setattr("nonrigid.formulations.partial_functional._APART", -1.0)
+    steps = match(pair, replace(SMALL, landmarks=0, map_evaluations=30, region_evaluations=20)).solutions
+    assert len(steps) in (8, 10)  # both starts go on: C v C each, then v C unless they had settled
 
 
 @settings(max_examples=20, deadline=None)

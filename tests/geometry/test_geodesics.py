@@ -167,3 +167,34 @@ def test_the_template_that_crashes_solvers_is_refused_raw_and_measured_clean(dat
     with pytest.raises(InputError, match="edges"):
         make_geodesics(raw, "exact")
     assert EdgeFlip(clean(raw).mesh).distance_pairs([0], [1]).shape == (1,)
+
+
+def holed(mesh: Mesh, count: int, radius: float, seed: int) -> Mesh:
+    """Return the largest piece of a mesh with round patches around some vertices cut out; vertices keep their order."""
+    centres = mesh.vertices[np.random.default_rng(seed).choice(len(mesh.vertices), count, replace=False)]
+    away = np.linalg.norm(mesh.vertices[:, None] - centres, axis=2).min(axis=1) > radius
+    found = trimesh.Trimesh(mesh.vertices, mesh.faces[away[mesh.faces].all(axis=1)], process=False)
+    piece = max(found.split(only_watertight=False), key=lambda one: one.area)
+    return Mesh(piece.vertices, piece.faces)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_bridges_bring_back_most_of_what_holes_add(seed: int) -> None:
+    part = holed(SPHERE, 8, 0.45, seed)
+    sources = np.arange(0, len(part.vertices), 7)
+    truth = np.arccos(np.clip(part.vertices[sources] @ part.vertices.T, -1, 1))
+    plain, bridged = (make_geodesics(part, method).distances(sources) for method in ("dijkstra", "bridged"))
+    assert (bridged <= plain + 1e-12).all()
+    assert np.abs(bridged - truth).mean() < 0.75 * np.abs(plain - truth).mean()
+
+
+def test_bridges_are_nothing_without_a_boundary_and_change_with_nothing_but_the_surface() -> None:
+    sources = [0, 40, 100]
+    plain, bridged = (make_geodesics(SPHERE, method).distances(sources) for method in ("dijkstra", "bridged"))
+    np.testing.assert_array_equal(plain, bridged)
+    part = holed(SPHERE, 3, 0.9, 1)  # loops of more vertices than bridges go between
+    order = np.random.default_rng(0).permutation(len(part.vertices))
+    turned = part.transformed(rotation=Rotation.from_rotvec([1.0, 0.2, 0.5]).as_matrix(), scale=3.0)
+    moved = Mesh(turned.vertices[order], np.argsort(order)[part.faces])
+    before = make_geodesics(part, "bridged").distances(order)[:, order]
+    np.testing.assert_allclose(make_geodesics(moved, "bridged").distances(np.arange(len(order))), 3.0 * before)
