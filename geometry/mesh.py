@@ -106,6 +106,15 @@ class Mesh:
         return np.unique(self.boundary_edges)
 
     @cached_property
+    def boundary_loops(self) -> tuple[IntArray, ...]:
+        """Sorted vertices of each connected piece of the boundary; loops that meet in a vertex are one."""
+        members, ends = np.unique(self.boundary_edges, return_inverse=True)
+        i, j = ends.reshape(-1, 2).T
+        graph = coo_array((np.ones(len(i)), (i, j)), shape=(len(members), len(members)))
+        piece = connected_components(graph, directed=False)[1] if len(members) else members
+        return tuple(members[piece == number] for number in np.unique(piece))
+
+    @cached_property
     def component_of_vertex(self) -> IntArray:
         """(n,) number of the connected component (through shared vertices) each vertex lies in."""
         i, j = self.edges.T

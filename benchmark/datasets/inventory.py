@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from nonrigid.benchmark.datasets.protocols import Dataset
-from nonrigid.benchmark.datasets.statistics import boundary_loops, part_statistics
+from nonrigid.benchmark.datasets.statistics import part_statistics
 from nonrigid.geometry.clean import clean
 from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.mesh import Mesh
@@ -38,7 +38,7 @@ def mesh_facts(mesh: Mesh) -> Row:
         "vertices": len(mesh.vertices),
         "faces": len(mesh.faces),
         "boundary_edges": len(mesh.boundary_edges),
-        "boundary_loops": boundary_loops(mesh),
+        "boundary_loops": len(mesh.boundary_loops),
         "nonmanifold_edges": int((users > 2).sum()),
         "euler": len(mesh.vertices) - len(mesh.edges) + len(mesh.faces),
         "defects": repairs,

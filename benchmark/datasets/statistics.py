@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from nonrigid.benchmark.datasets.protocols import PairData
 from nonrigid.geometry.mesh import Mesh
@@ -43,7 +41,7 @@ def part_statistics(data: PairData) -> dict[str, object]:
         "faces": len(part.faces),
         "area_kept": data.kept_area,
         "boundary_length": float(_lengths(part, part.boundary_edges).sum() / unit),
-        "boundary_loops": boundary_loops(part),
+        "boundary_loops": len(part.boundary_loops),
         "mean_edge": float(_lengths(part, part.edges).mean() / unit),
         "ratio_5": ratios[0],
         "ratio_50": ratios[1],
@@ -77,12 +75,3 @@ def summary(rows: Iterable[Mapping[str, object]]) -> dict[str, object]:
 
 def _lengths(mesh: Mesh, edges: np.ndarray) -> np.ndarray:
     return np.asarray(np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1))
-
-
-def boundary_loops(mesh: Mesh) -> int:
-    """Return the number of pieces of the boundary; loops that meet in a vertex count as one."""
-    edges = mesh.boundary_edges
-    vertices, ends = np.unique(edges, return_inverse=True)
-    i, j = ends.reshape(-1, 2).T
-    graph = coo_array((np.ones(len(i)), (i, j)), shape=(len(vertices), len(vertices)))
-    return int(connected_components(graph, directed=False)[0]) if len(vertices) else 0

@@ -6,13 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
-from scipy.sparse import coo_array, csr_array
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse import csr_array
 
 from nonrigid.geometry.arrays import FloatArray, IntArray
-from nonrigid.geometry.geodesics.dijkstra import symmetric_graph, virtual_edges
-from nonrigid.geometry.geodesics.protocol import checked_vertices
+from nonrigid.geometry.geodesics.dijkstra import DijkstraGeodesics, symmetric_graph, virtual_edges
 from nonrigid.geometry.mesh import Mesh
 
 BULGE = 1.15
@@ -23,17 +20,15 @@ ENDS = 64
 
 
 @dataclass(frozen=True, eq=False)
-class BridgedGeodesics:
+class BridgedGeodesics(DijkstraGeodesics):
     """Measure along edges, virtual edges, and bridges between vertices of the same boundary loop.
 
-    A hole makes ways longer, up to twice between the ends of a torn body; most of what it adds goes away when ways may
-    cross it, at `BULGE` times the straight line. A surface without boundary has the distances of `DijkstraGeodesics`.
-    What these distances are better for is estimating those of the surface that a part was cut from: on the
-    parts measured, docs/bridges.md.
+    A hole makes ways longer; most of what it adds goes away when ways may cross it, at `BULGE` times the straight line.
+    A surface without boundary has the distances of `DijkstraGeodesics`.
+    They estimate distances on the surface that a part was cut from; how well is measured in docs/bridges.md.
 
     Examples
     --------
-    >>> from nonrigid.geometry.geodesics.dijkstra import DijkstraGeodesics
     >>> ring = np.array([[np.cos(a), np.sin(a)] for a in np.arange(12) * np.pi / 6])
     >>> vertices = np.vstack([np.c_[ring, np.zeros(12)], np.c_[ring, 0.1 * np.ones(12)]])
     >>> quads = [(i, (i + 1) % 12, 12 + (i + 1) % 12, 12 + i) for i in range(12)]
@@ -42,7 +37,6 @@ class BridgedGeodesics:
     (3.106, 2.3)
     """
 
-    mesh: Mesh
     name: str = "bridged"
 
     @cached_property
@@ -56,31 +50,11 @@ class BridgedGeodesics:
             np.vstack([mesh.edges, ends, bridges]), np.concatenate([lengths, across, spans]), len(mesh.vertices)
         )
 
-    def distances(self, sources: ArrayLike) -> FloatArray:
-        """Return the (s, n) distances from `sources`, in the unit of the vertices; inf where there is no way."""
-        numbers = checked_vertices(sources, len(self.mesh.vertices))
-        return np.asarray(dijkstra(self.graph, directed=True, indices=numbers), dtype=np.float64)
-
-
-def boundary_loops(mesh: Mesh) -> list[IntArray]:
-    """Return the vertices of each connected piece of the boundary, ascending.
-
-    Examples
-    --------
-    >>> boundary_loops(Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]]))
-    [array([0, 1, 2, 3])]
-    """
-    edges, members = mesh.boundary_edges, mesh.boundary_vertices
-    i, j = edges.T
-    graph = coo_array((np.ones(len(edges)), (i, j)), shape=(len(mesh.vertices), len(mesh.vertices)))
-    piece = connected_components(graph, directed=False)[1][members]
-    return [members[piece == number] for number in np.unique(piece)]
-
 
 def _bridges(mesh: Mesh) -> tuple[IntArray, FloatArray]:
     """Return the (b, 2) ends of the bridges, and their (b,) lengths."""
     pairs = [np.empty((0, 2), dtype=np.int64)]
-    for loop in boundary_loops(mesh):
+    for loop in mesh.boundary_loops:
         kept = _spread(mesh.vertices[loop])
         i, j = np.triu_indices(len(kept), 1)
         pairs.append(np.sort(np.stack([loop[kept[i]], loop[kept[j]]], axis=1), axis=1))

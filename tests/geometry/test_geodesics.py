@@ -198,3 +198,9 @@ def test_bridges_are_nothing_without_a_boundary_and_change_with_nothing_but_the_
     moved = Mesh(turned.vertices[order], np.argsort(order)[part.faces])
     before = make_geodesics(part, "bridged").distances(order)[:, order]
     np.testing.assert_allclose(make_geodesics(moved, "bridged").distances(np.arange(len(order))), 3.0 * before)
+
+
+def test_loops_of_the_boundary_are_its_pieces() -> None:
+    assert SPHERE.boundary_loops == ()
+    two = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 0, 0], [6, 0, 0], [5, 1, 0]], [[0, 1, 2], [3, 4, 5]])
+    assert [loop.tolist() for loop in two.boundary_loops] == [[0, 1, 2], [3, 4, 5]]
