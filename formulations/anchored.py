@@ -32,7 +32,7 @@ class Start:
 
     Parameters
     ----------
-    kernel_width, mix, per_sample
+    kernel_width, mix
         Factors of the settings of the same name.
     bridged
         Whether the game's distances on the part may cross what was cut out; all others go along it.
@@ -42,7 +42,6 @@ class Start:
 
     kernel_width: float = 1.0
     mix: float = 1.0
-    per_sample: int = 1
     bridged: bool = True
     peeled: bool = False
 
@@ -50,8 +49,8 @@ class Start:
 STARTS = (Start(), Start(kernel_width=2 / 3, bridged=False), Start(peeled=True), Start(bridged=False))
 """Starts in the order in which they are tried."""
 
-LAST_STARTS = (Start(kernel_width=2 / 3, mix=0.6), Start(mix=1.6, per_sample=2))
-"""Starts that are tried where these leave the best map unsure: few anchors, and many."""
+LAST_STARTS = (Start(kernel_width=2 / 3, mix=0.6), Start(kernel_width=5 / 3, mix=1.6, bridged=False))
+"""Starts that are tried while these leave the best map unsure: few anchors, and many."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,7 +133,7 @@ class Anchored:
     starts: int = 4
     enough: float = 0.85
     repeats: int = 3
-    unsure: float = 0.7
+    unsure: float = 0.8
     part_size: int = 100
     full_size: int = 200
     between_vertices: bool = True
@@ -174,7 +173,9 @@ class Anchored:
             if best.score >= self.enough:
                 break
         best = yield from self._repeated(pair, basis, samples, best)
-        for start in LAST_STARTS if best.score < self.unsure else ():
+        for start in LAST_STARTS:
+            if best.score >= self.unsure:
+                break
             rows = yield from self._anchored(pair, samples, start)
             other = yield from self._grown(pair, basis, samples, rows, self.steps)
             best = max(best, (yield from self._repeated(pair, basis, samples, other)))
@@ -203,7 +204,7 @@ class Anchored:
             on_full = pair.full.distances(full)[:, samples.grid]
             images = samples.placed_by(on_part, on_full, reach=self.reach, descriptor_weight=weight)
         else:
-            matches = samples.candidates(self.per_sample * start.per_sample)
+            matches = samples.candidates(self.per_sample)
             share = (
                 yield game(
                     "game",
