@@ -128,7 +128,7 @@ def test_a_real_cut_is_matched_at_every_vertex(data: Path) -> None:
 
 def test_matches_can_be_kept_to_vertices_and_the_slow_growth_be_left_out(creature: PairData) -> None:
     part = random_rigid_motion(creature.part)[0]
-    small = replace(SMALL, starts=1, repeats=0, steps=2, last_steps=0, between_vertices=False)
+    small = replace(SMALL, starts=1, repeats=0, unsure=0.0, steps=2, last_steps=0, between_vertices=False)
     result = match(Pair.of(part, creature.full), small)
     assert [solution.problem for solution in result.solutions] == ["game", "map", "map"]
     assert result.correspondence is not None
