@@ -139,7 +139,10 @@ class GuardedChild:
             self._pipe.send(None)
 
     def end(self, *, seconds: float | None = None, until: str | None = None) -> Ended:
-        """Wait for the end of the child's work, or kill it, and say how it ended; arguments as in `guarded_call`."""
+        """Wait for the end of the child's work, or kill it, and say how it ended.
+
+        Arguments, and the `StorageError` that the child may raise, are those of `guarded_call`.
+        """
         deadline = None if seconds is None else time.monotonic() + seconds
         told, child = "", self._process
         while True:
@@ -214,8 +217,9 @@ def _child(
         last = ("storage", str(failure))
     except Exception as failure:  # whatever a third party raises
         last = ("done", f"{type(failure).__name__}: {failure}")
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError):  # a full disk: what has to be told is told all the same
+            stream.flush()
     flush_native_output()
     pipe.send(last)
     pipe.close()

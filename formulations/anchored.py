@@ -37,7 +37,8 @@ class Start:
     bridged
         Whether the game's distances on the part may cross what was cut out; all others go along it.
     peeled
-        Whether the anchors are those of `GameTheoretic` without its second game: groups peeled off, and merged.
+        Whether the anchors are those of `GameTheoretic` without its second game, on that method's samples of the full
+        surface: groups peeled off, and merged.
     """
 
     kernel_width: float = 1.0
@@ -66,8 +67,8 @@ class Anchored:
        turn, and steps 2 and 3 are done again while that makes it surer.
     5. The last map reads off every vertex, and a point of a triangle around the best vertex.
 
-    Descriptors take part in each step, by how far they can be trusted: near its boundary a part does not look like the
-    whole.
+    Descriptors take part in each step; after the games, by how far they can be trusted: near its boundary a part does
+    not look like the whole.
 
     Parameters
     ----------
@@ -195,6 +196,7 @@ class Anchored:
             peeling = GameTheoretic(
                 radii=self.radii,
                 part_samples=self.part_samples,
+                per_sample=self.per_sample,
                 kernel_width=width,
                 geodesics="bridged" if start.bridged else "dijkstra",
                 local_candidates=0,

@@ -30,7 +30,8 @@ def distortion(
     With d and D the geodesic distances on the part and on the full surface, "two-sided" is |d - D|. A path that the cut
     removed can only make d longer, never shorter, than the true D; so "one-sided" is max(0, D - d) + excess_weight *
     max(0, d - D), and "certified" is two-sided for pairs of points whose distance the cut provably left alone,
-    one-sided for the others. `geodesics` says how both are measured: "bridged" ones may cross what was cut out.
+    one-sided for the others. `geodesics` says how both are measured: "bridged" ones may cross what was cut out, and be
+    too short, so that only "two-sided" has a meaning for them.
 
     `keep=False` says that these candidates' distances will not be asked for again, and are not worth a place in the
     cache.
@@ -39,11 +40,15 @@ def distortion(
     ------
     UnknownNameError
         If `sides` is not one of the three.
+    InputError
+        If `excess_weight` is not between 0 and 1, or other `sides` than "two-sided" meet "bridged" geodesics.
     """
     if sides not in SIDES:
         raise UnknownNameError("kind of distortion", sides, SIDES)
     if not 0.0 <= excess_weight <= 1.0:
         raise InputError(f"excess_weight is {excess_weight}", remedy="give a number between 0 and 1")
+    if sides != "two-sided" and geodesics == "bridged":
+        raise InputError(f"{sides} distortion of bridged distances", remedy='give geodesics="dijkstra" as well')
     part, of_part = _distinct(matches.part)
     full, of_full = _distinct(matches.full)
     on_part = pair.part.distances_between(part, geodesics)

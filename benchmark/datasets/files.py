@@ -169,7 +169,8 @@ def _unpack(member: Member, path: Path) -> None:
                 shutil.copyfileobj(packed, stream)
         except KeyError:
             raise InputError("the archive has no such file", file=member, remedy="complete the archive") from None
-        except (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError) as error:
+        # The last is what zipfile raises for a password or a compression that it does not know.
+        except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError) as error:
             raise InputError(f"cannot be unpacked: {error}", file=member, remedy="fetch the archive again") from None
 
 

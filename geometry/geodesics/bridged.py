@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from nonrigid.geometry.arrays import FloatArray, IntArray
-from nonrigid.geometry.geodesics.dijkstra import DijkstraGeodesics, symmetric_graph, virtual_edges
+from nonrigid.geometry.geodesics.dijkstra import DijkstraGeodesics, surface_segments, symmetric_graph
 from nonrigid.geometry.mesh import Mesh
 
 BULGE = 1.15
@@ -24,8 +24,10 @@ class BridgedGeodesics(DijkstraGeodesics):
     """Measure along edges, virtual edges, and bridges between vertices of the same boundary loop.
 
     A hole makes ways longer; most of what it adds goes away when ways may cross it, at `BULGE` times the straight line.
-    A surface without boundary has the distances of `DijkstraGeodesics`.
-    They estimate distances on the surface that a part was cut from; how well is measured in docs/bridges.md.
+    A surface without boundary has the distances of `DijkstraGeodesics`. They estimate distances on the surface that a
+    part was cut from, and may be shorter or longer than those; how well is measured in docs/bridges.md.
+
+    Source: this package.
 
     Examples
     --------
@@ -42,13 +44,9 @@ class BridgedGeodesics(DijkstraGeodesics):
     @cached_property
     def graph(self) -> csr_array:
         """The (n, n) symmetric graph of lengths."""
-        mesh = self.mesh
-        lengths = np.linalg.norm(mesh.vertices[mesh.edges[:, 0]] - mesh.vertices[mesh.edges[:, 1]], axis=1)
-        ends, across = virtual_edges(mesh)
-        bridges, spans = _bridges(mesh)
-        return symmetric_graph(
-            np.vstack([mesh.edges, ends, bridges]), np.concatenate([lengths, across, spans]), len(mesh.vertices)
-        )
+        ends, lengths = surface_segments(self.mesh)
+        bridges, spans = _bridges(self.mesh)
+        return symmetric_graph(np.vstack([ends, bridges]), np.concatenate([lengths, spans]), len(self.mesh.vertices))
 
 
 def _bridges(mesh: Mesh) -> tuple[IntArray, FloatArray]:

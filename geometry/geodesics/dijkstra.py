@@ -57,13 +57,18 @@ def virtual_edge_graph(mesh: Mesh) -> csr_array:
     >>> graph.nnz, round(float(graph[1, 3]), 4)
     (12, 1.4142)
     """
+    return symmetric_graph(*surface_segments(mesh), len(mesh.vertices))
+
+
+def surface_segments(mesh: Mesh) -> tuple[IntArray, FloatArray]:
+    """Return the (s, 2) ends of all edges and virtual edges, and their (s,) lengths in the unit of the vertices."""
     edges = mesh.edges
     lengths = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
-    ends, across = virtual_edges(mesh)
-    return symmetric_graph(np.vstack([edges, ends]), np.concatenate([lengths, across]), len(mesh.vertices))
+    ends, across = _virtual_edges(mesh)
+    return np.vstack([edges, ends]), np.concatenate([lengths, across])
 
 
-def virtual_edges(mesh: Mesh) -> tuple[IntArray, FloatArray]:
+def _virtual_edges(mesh: Mesh) -> tuple[IntArray, FloatArray]:
     """Return the (v, 2) opposite corners that see each other across an edge, and the (v,) unfolded lengths."""
     a, b, c, d = _hinges(mesh)
     shared = mesh.vertices[b] - mesh.vertices[a]
@@ -98,7 +103,10 @@ def _hinges(mesh: Mesh) -> tuple[IntArray, IntArray, IntArray, IntArray]:
 
 
 def symmetric_graph(ends: IntArray, lengths: FloatArray, count: int) -> csr_array:
-    """Return the graph with both directions of each edge; of parallel edges the shortest, never their sum."""
+    """Return the (count, count) graph of (e, 2) edges and their (e,) lengths, both directions of each.
+
+    Of parallel edges the shortest stays, never their sum.
+    """
     ends, lengths = ends[ends[:, 0] != ends[:, 1]], lengths[ends[:, 0] != ends[:, 1]]
     order = np.lexsort((lengths, ends[:, 1], ends[:, 0]))
     ends, lengths = ends[order], lengths[order]

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import errno
 import faulthandler
+import io
 import os
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -142,3 +145,16 @@ def test_children_end_with_whoever_stops_asking_for_them(tmp_path: Path) -> None
         next(children)
     time.sleep(0.8)
     assert not (tmp_path / "alive").exists()
+
+
+def test_a_disk_too_full_to_print_on_does_not_keep_a_failure_from_being_told() -> None:
+    class Full(io.StringIO):
+        def flush(self) -> None:
+            raise OSError(errno.ENOSPC, "no space left")
+
+    def work(tell: Tell) -> None:
+        sys.stdout = Full()
+        raise StorageError("full")
+
+    with pytest.raises(StorageError, match="full"):
+        guarded_call(work)

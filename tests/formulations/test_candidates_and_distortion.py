@@ -95,6 +95,8 @@ def test_wrong_options_of_the_distortion_are_refused(pair: Pair) -> None:
         consistency(pair, matches, kernel_width=0.0)
     with pytest.raises(InputError, match="excess_weight"):
         distortion(pair, matches, sides="one-sided", excess_weight=2.0)
+    with pytest.raises(InputError, match='geodesics="dijkstra"'):
+        distortion(pair, matches, sides="certified", geodesics="bridged")
 
 
 def test_multilateration_is_least_at_the_true_point(itself: Pair) -> None:
