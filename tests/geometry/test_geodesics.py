@@ -16,6 +16,7 @@ from nonrigid.geometry.geodesics import METHODS, EdgeFlip, Geodesics, make_geode
 from nonrigid.geometry.geodesics.exact import MissingExtraError
 from nonrigid.geometry.io import read_mesh
 from nonrigid.geometry.mesh import Mesh
+from nonrigid.geometry.partial import largest_piece, restrict
 
 
 def plane(n: int = 12, seed: int = 0) -> Mesh:
@@ -173,9 +174,7 @@ def holed(mesh: Mesh, count: int, radius: float, seed: int) -> Mesh:
     """Return the largest piece of a mesh with round patches around some vertices cut out; vertices keep their order."""
     centres = mesh.vertices[np.random.default_rng(seed).choice(len(mesh.vertices), count, replace=False)]
     away = np.linalg.norm(mesh.vertices[:, None] - centres, axis=2).min(axis=1) > radius
-    found = trimesh.Trimesh(mesh.vertices, mesh.faces[away[mesh.faces].all(axis=1)], process=False)
-    piece = max(found.split(only_watertight=False), key=lambda one: one.area)
-    return Mesh(piece.vertices, piece.faces)
+    return restrict(mesh, largest_piece(mesh, away[mesh.faces].all(axis=1))).mesh
 
 
 @pytest.mark.parametrize("seed", range(4))
