@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -65,7 +66,10 @@ class Anchored:
        ever more eigenfunctions.
     4. Where the mean confidence of the best map from several starts is low, its best images become anchors in their
        turn, and steps 2 and 3 are done again while that makes it surer.
-    5. The last map reads off every vertex, and a point of a triangle around the best vertex.
+    5. Where it stays low, as on parts torn by many holes, maps also grow on a leash: before each fit, images far from
+       where the surest ones place them are put there.
+    6. The last map reads off every vertex, images that stray looked for again near where the surest ones place them,
+       and a point of a triangle around the best vertex.
 
     Descriptors take part in each step; after the games, by how far they can be trusted: near its boundary a part does
     not look like the whole.
@@ -100,7 +104,10 @@ class Anchored:
     repeats
         How often, at most, the images of a map that is not sure enough become anchors again.
     unsure
-        Mean confidence below which `LAST_STARTS` are tried too.
+        Mean confidence below which `LAST_STARTS` are tried too, and maps grow on a leash.
+    leash, straying
+        How far an image may lie from where the surest samples' distances place it, in units of sqrt(full area): while
+        a map grows on a leash, and in the end.
     part_size, full_size
         Largest numbers of eigenfunctions.
     between_vertices
@@ -135,6 +142,8 @@ class Anchored:
     enough: float = 0.85
     repeats: int = 3
     unsure: float = 0.8
+    leash: float = 0.04
+    straying: float = 0.1
     part_size: int = 100
     full_size: int = 200
     between_vertices: bool = True
@@ -182,7 +191,11 @@ class Anchored:
             best = max(best, (yield from self._repeated(pair, basis, samples, other)))
         if self.last_steps:
             best = max(best, (yield from self._grown(pair, basis, samples, best.rows, self.last_steps)))
-        found, nearest = basis.read_off(best.C, pair.full.mesh)
+            best = yield from self._leashed(pair, basis, samples, best)
+        strays = partial(
+            samples.strays, pair, length=self.straying, share=self.kept, reach=self.local_reach, keeping=KEEPING
+        )
+        found, nearest = basis.read_off(best.C, pair.full.mesh, strays=strays, length=self.straying)
         confidence = samples.confidence(pair, np.arange(len(nearest)), nearest, width=KEEPING)
         if not self.between_vertices:
             return Correspondence.between_vertices(pair, np.arange(len(nearest)), nearest, confidence)
@@ -236,13 +249,47 @@ class Anchored:
                 break
         return best
 
-    def _grown(
-        self, pair: Pair, basis: Bases, samples: SampledDistances, rows: IntArray, steps: int
+    def _leashed(
+        self, pair: Pair, basis: Bases, samples: SampledDistances, best: Grown
     ) -> Generator[Problem, Solved, Grown]:
-        """Grow a map from images of the samples, and score it."""
-        C, images = yield from grown(
-            basis, samples.points, samples.grid[rows], basis.sizes(self.first_size, steps), grid=samples.grid
+        """Grow a map on a leash, and again from its own images, while the best is unsure and that makes it surer."""
+        rows = best.rows
+        for _ in range(self.repeats):
+            if best.score >= self.unsure:
+                break
+            other = yield from self._grown(pair, basis, samples, rows, self.last_steps, leash=self.leash)
+            if other.score < best.score + _GAIN:
+                break
+            best, rows = other, self._settled(samples, samples.on_grid(pair, other.images))
+        return best
+
+    def _grown(
+        self,
+        pair: Pair,
+        basis: Bases,
+        samples: SampledDistances,
+        rows: IntArray,
+        steps: int,
+        *,
+        leash: float = np.inf,
+    ) -> Generator[Problem, Solved, Grown]:
+        """Grow a map from images of the samples, and score it by its images, strays among them put right."""
+        held = partial(
+            samples.leashed,
+            pair,
+            share=self.kept,
+            reach=self.local_reach,
+            descriptor_weight=self.placing_weight,
         )
+        C, images = yield from grown(
+            basis,
+            samples.points,
+            samples.grid[rows],
+            basis.sizes(self.first_size, steps),
+            grid=samples.grid,
+            corrected=partial(held, length=leash) if leash < np.inf else None,
+        )
+        images = held(images, self.straying)
         return Grown(float(samples.confidence(pair, samples.points, images, width=KEEPING).mean()), C, rows, images)
 
 

@@ -122,14 +122,63 @@ class SampledDistances:
         vertices, nearest
             (n,) vertices of the part, the first s samples among them, and a vertex of the full surface for each.
         """
+        return np.asarray(np.exp(-np.log(2.0) * np.square(self._changes(pair, vertices, nearest) / width)))
+
+    def _changes(self, pair: Pair, vertices: IntArray, nearest: IntArray) -> FloatArray:
+        """Return the mean |d - D| of vertices to the first s samples, near ones counting most: a length."""
         samples, image = self.points[: len(self.on_part)], self.on_grid(pair, nearest)
         row = np.empty(len(pair.part.mesh.vertices), dtype=np.int64)
         row[vertices] = np.arange(len(vertices))
         on_part = pair.part.distances(samples)[:, vertices]
         weight = np.exp(-np.square(on_part / NEAR))
         off = np.abs(on_part - self.on_full[np.ix_(image[row[samples]], image)])
-        mean = (weight * off).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-300)
-        return np.asarray(np.exp(-np.log(2.0) * np.square(mean / width)))
+        return np.asarray((weight * off).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-300))
+
+    def leashed(
+        self, pair: Pair, images: IntArray, length: float, *, share: float, reach: float, descriptor_weight: float
+    ) -> IntArray:
+        """Return images of the samples, those farther than `length` from where the surest ones place them put there.
+
+        Parameters
+        ----------
+        images
+            (p,) vertices of the full surface.
+        length
+            In space, in units of sqrt(full area).
+        """
+        rows = self.on_grid(pair, images)
+        sure = self.surest(rows, share)
+        placed = self.grid[self.placed(sure, rows[sure], reach=reach, descriptor_weight=descriptor_weight)]
+        where = pair.full.mesh.vertices
+        return np.where(np.linalg.norm(where[images] - where[placed], axis=1) > length, placed, images)
+
+    def strays(
+        self, pair: Pair, nearest: IntArray, length: float, *, share: float, reach: float, keeping: float
+    ) -> tuple[IntArray, IntArray]:
+        """Return which vertices of the part lie off where the surest samples place them, and that place.
+
+        Looked at are those whose distances to the samples are off by more than `keeping` on average: others are near.
+
+        Parameters
+        ----------
+        nearest
+            (n,) vertices of the full surface, one for each of the part.
+        length
+            How far off is too far, in space.
+
+        Returns
+        -------
+        (k,) vertices of the part, and (k,) vertices of the full surface.
+        """
+        unsure = np.flatnonzero(self._changes(pair, np.arange(len(nearest)), nearest) > keeping)
+        samples = self.points[: len(self.on_part)]
+        rows = self.on_grid(pair, nearest[samples])
+        sure = self.surest(rows, share)
+        on_part = pair.part.distances(samples)[np.ix_(sure, unsure)]
+        around = self.grid[placing_cost(on_part, self.on_full[rows[sure]], reach=reach).argmin(axis=1)]
+        where = pair.full.mesh.vertices
+        far = np.linalg.norm(where[nearest[unsure]] - where[around], axis=1) > length
+        return unsure[far], around[far]
 
     def surest(self, images: IntArray, share: float) -> IntArray:
         """Return which of the first s samples agree best with their neighbours, a given share of them."""

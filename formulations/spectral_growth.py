@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from nonrigid.formulations.candidates import principal_axes
 from nonrigid.formulations.formulation import Pair, Solved
@@ -19,6 +20,9 @@ from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.maps import nearest_rows
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.points import SurfacePoints
+
+Strays = Callable[[IntArray], tuple[IntArray, IntArray]]
+"""Of (n,) nearest vertices, says which rows are not believed, and a vertex near which each of these should lie."""
 
 RANK_AT = 100
 """Number of eigenvalues of the full surface by which the part's share of the spectrum is estimated."""
@@ -78,8 +82,16 @@ class Bases:
         queries = np.hstack([self.part[points, : C.shape[1]] @ C.T, weight * looks])
         return queries, np.hstack([self.full[:, :size], others])
 
-    def read_off(self, C: FloatArray, full: Mesh) -> tuple[SurfacePoints, IntArray]:
+    def read_off(
+        self, C: FloatArray, full: Mesh, *, strays: Strays | None = None, length: float = np.inf
+    ) -> tuple[SurfacePoints, IntArray]:
         """Return, for every vertex of the part, the point of the full surface with the nearest features.
+
+        Parameters
+        ----------
+        strays, length
+            Given the nearest vertices, says for which vertices of the part they are not believed, and around which
+            vertex the nearest is to be looked for instead, at most so far from it in space.
 
         Returns
         -------
@@ -87,6 +99,9 @@ class Bases:
         """
         queries, features = self.features(C, slice(None))
         nearest = nearest_rows(queries, features)[0]
+        if strays is not None:
+            rows, around = strays(nearest)
+            nearest[rows] = nearest_within(queries[rows], features, full.vertices, around, length)
         return closest_feature_points(queries, features, full, nearest), nearest
 
 
@@ -136,13 +151,48 @@ def map_fit(name: str, rough: FloatArray) -> Problem:
     return Problem(name, maximize(Linear(rough)(C)), C @ Stiefel())
 
 
+def nearest_within(
+    queries: FloatArray, targets: FloatArray, places: FloatArray, around: IntArray, length: float
+) -> IntArray:
+    """Return, for each query, the nearest target among those whose places lie at most `length` from one's place.
+
+    Parameters
+    ----------
+    queries, targets
+        (q, d) and (t, d) rows.
+    places
+        (t, 3) where the targets lie.
+    around
+        (q,) target in whose neighbourhood each query looks.
+
+    Examples
+    --------
+    >>> line = np.arange(4.0)[:, None]
+    >>> nearest_within(np.array([[3.1], [3.1]]), line, line * [1, 0, 0], np.array([1, 3]), 1.0)
+    array([2, 3])
+    """
+    found = np.empty(len(queries), dtype=np.int64)
+    tree = cKDTree(places)
+    for centre in np.unique(around):
+        rows = np.flatnonzero(around == centre)
+        near = np.sort(np.array(tree.query_ball_point(places[centre], length), dtype=np.int64))
+        found[rows] = near[nearest_rows(queries[rows], targets[near])[0]]
+    return found
+
+
 FINE = 5
 """Number of last maps that are read off at every vertex. Earlier ones are read off on a grid, which takes a fraction of
 the time; with 3, one of six parts tried lost the end of a limb."""
 
 
 def grown(
-    basis: Bases, points: IntArray, images: IntArray, sizes: IntArray, *, grid: IntArray
+    basis: Bases,
+    points: IntArray,
+    images: IntArray,
+    sizes: IntArray,
+    *,
+    grid: IntArray,
+    corrected: Callable[[IntArray], IntArray] | None = None,
 ) -> Generator[Problem, Solved, tuple[FloatArray, IntArray]]:
     """Fit a functional map to matches and read better matches off it, with ever more eigenfunctions.
 
@@ -154,6 +204,8 @@ def grown(
         Numbers of eigenfunctions of the full surface, rising.
     grid
         Vertices of the full surface, spread evenly, among which images are looked for at first.
+    corrected
+        Makes better images of those read off a map, before the next is fitted to them.
 
     Returns
     -------
@@ -163,6 +215,8 @@ def grown(
     with orthonormal maps and with descriptors beside the eigenfunctions.
     """
     for number, size in enumerate(sizes, start=1):
+        if corrected is not None and number > 1:
+            images = corrected(images)
         part = basis.part[points, : basis.part_size(int(size))]
         rough = np.asarray(np.linalg.lstsq(part, basis.full[images, :size], rcond=None)[0].T, dtype=np.float64)
         solution = yield map_fit("map", rough)

@@ -13,9 +13,10 @@ from scipy.stats import ortho_group
 from nonrigid.benchmark.datasets.protocols import PairData
 from nonrigid.benchmark.datasets.shrec16 import Shrec16
 from nonrigid.benchmark.protocol import random_rigid_motion, score
-from nonrigid.formulations.anchored import LAST_STARTS, STARTS, Anchored
+from nonrigid.formulations.anchored import KEEPING, LAST_STARTS, STARTS, Anchored
 from nonrigid.formulations.formulation import Correspondence, Pair
 from nonrigid.formulations.interpolation import closest_feature_points
+from nonrigid.formulations.sampled_distances import sampled_distances
 from nonrigid.formulations.spectral_growth import bases, map_fit
 from nonrigid.formulations.trusted_descriptors import trusted_descriptors
 from nonrigid.geometry.errors import InputError
@@ -115,6 +116,26 @@ def test_a_map_that_stays_unsure_is_started_in_every_way(creature: PairData) -> 
         solution.problem for solution in match(Pair.of(part, creature.full), replace(hopeless, enough=0.0)).solutions
     ]
     assert sure[:3] == ["game", "map", "map"]
+
+
+def test_a_patch_sent_to_the_wrong_limb_is_brought_back(creature: PairData) -> None:
+    pair = Pair.of(creature.part, creature.full)
+    descriptors = trusted_descriptors(pair, SMALL.radii, power=1.0)
+    samples = sampled_distances(pair, descriptors, part_samples=200, placed_samples=400, full_samples=700)
+    where = pair.full.mesh.vertices
+    true = pair.full.clean_view.from_raw(creature.truth).nearest_corner(pair.full.mesh)
+    true = true[pair.part.clean_view.raw_of_vertex]
+    wrong = int(np.linalg.norm(where - where[true[0]], axis=1).argmax())
+    patch = np.flatnonzero(pair.part.distances([0])[0] < 0.05)
+    assert 1 < len(patch) < 0.05 * len(true)
+    nearest = true.copy()
+    nearest[patch] = wrong
+    rows, around = samples.strays(pair, nearest, 0.1, share=0.6, reach=0.12, keeping=KEEPING)
+    assert set(patch) <= set(rows)
+    off = np.linalg.norm(where[around] - where[true[rows]], axis=1)
+    assert np.quantile(off[np.isin(rows, patch)], 0.9) < 0.1
+    images = samples.leashed(pair, nearest[samples.points], 0.1, share=0.6, reach=0.12, descriptor_weight=0.03)
+    assert not (images == wrong).any()
 
 
 @pytest.mark.realdata
