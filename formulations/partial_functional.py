@@ -113,7 +113,7 @@ class PartialFunctionalMap:
     closest_point_iterations: int = 10
     closest_point_samples: int = 500
     map_evaluations: int = 200
-    region_evaluations: int = 60
+    region_evaluations: int = 40
 
     method: ClassVar[str] = "pfm"
 
