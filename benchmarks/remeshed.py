@@ -94,11 +94,12 @@ def remeshed_pair(raw: PairData, vertices: int) -> tuple[PairData, FloatArray]:
 
 
 def _repaired(data: PairData) -> PairData:
-    """Return the pair on its repaired part: collapses need surfaces without two fans of triangles at one vertex."""
-    view = Surface(data.part, cache=None).clean_view
-    rows = view.raw_of_vertex
-    truth, mirrored = (None if of is None else of[rows] for of in (data.truth, data.mirrored))
-    return PairData(name=data.name, part=view.mesh, full=data.full, truth=truth, mirrored=mirrored)
+    """Return the pair on its repaired surfaces: collapses need ones without two fans of triangles at one vertex."""
+    part, full = (Surface(mesh, cache=None).clean_view for mesh in (data.part, data.full))
+    truth, mirrored = (
+        None if of is None else full.from_raw(of[part.raw_of_vertex]) for of in (data.truth, data.mirrored)
+    )
+    return PairData(name=data.name, part=part.mesh, full=full.mesh, truth=truth, mirrored=mirrored)
 
 
 def run(root: Path, name: str, method: str, vertices: int | None) -> Row:
