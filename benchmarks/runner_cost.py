@@ -1,9 +1,10 @@
 """What the runner itself costs a run, and what a second worker gains.
 
-Usage: python benchmarks/runner_cost.py [--runs 60] [--seconds 0.5]
+Usage: python benchmarks/runner_cost.py [--runs 60] [--seconds 0.5] [--repeats 7]
 
 The method does next to nothing, then sleeps. The cost of the runner is the time of a run beyond the same match and
-score called directly in this process (the peer); expect at most 20 ms on an idle machine. The processor time of both is
+score called directly in this process (the peer); expect at most 20 ms on an idle machine. Direct calls and the runner
+take turns, since machines change their speed: each cost is a difference of neighbours. The processor time of both is
 printed too, which a busy machine disturbs less. Throughput is measured with runs that sleep, so that it shows the
 runner's share and not the number of cores.
 """
@@ -22,12 +23,15 @@ import chaos
 import numpy as np
 from chaos_trial import PLAN, write_trial
 
+from nonrigid.geometry.arrays import FloatArray
+
 
 def main() -> None:
     """Measure, and print a table."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--runs", type=int, default=60)
     parser.add_argument("--seconds", type=float, default=0.5)
+    parser.add_argument("--repeats", type=int, default=7)
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         stage = chaos.Stage(Path(folder), True, random.Random(0))
@@ -35,10 +39,10 @@ def main() -> None:
         environment = stage.environment("events.txt")
         os.environ.update(environment)
         sys.path.insert(0, str(stage.folder / "site"))
-        measure(stage, options.runs, options.seconds)
+        measure(stage, options.runs, options.seconds, options.repeats)
 
 
-def measure(stage: chaos.Stage, count: int, seconds: float) -> None:
+def measure(stage: chaos.Stage, count: int, seconds: float, repeats: int) -> None:
     """Time direct calls, one worker and two workers."""
     from nonrigid.benchmark.executors import make_executor
     from nonrigid.benchmark.plan import read_plan
@@ -59,25 +63,27 @@ def measure(stage: chaos.Stage, count: int, seconds: float) -> None:
     idle = read_plan(plan(0.0))
     data = idle.pairs()[0].load()
     pair = Pair.of(random_rigid_motion(data.part, 0)[0], data.full)
-    times, worked = [], spent()
-    for entry in idle.methods:
-        begun = time.perf_counter()
-        found = match(pair, entry.formulation, "native", limits=idle.limits)
-        assert found.correspondence is not None
-        score(data, found.correspondence.dense(len(data.part.vertices)))
-        times.append(time.perf_counter() - begun)
-    direct, work = float(np.median(times)), (spent() - worked) / count
-    worked = spent()
-    out = stage.folder / "idle"
-    # As a user starts it: this process holds more than the command does, and is slower to fork.
-    if stage.start(out, "events.txt").wait():
-        raise SystemExit("the benchmark failed")
-    ended = np.sort([path.stat().st_mtime for path in (out / "runs").glob("*.json")])
-    each, guarded = float(np.median(np.diff(ended))), (spent() - worked) / count
-    lines = [f"{'direct match and score':34s} {1e3 * direct:8.1f} ms a run"]
-    lines += [f"{'run_plan, from record to record':34s} {1e3 * each:8.1f} ms a run"]
-    lines += [f"{'cost of the runner':34s} {1e3 * (each - direct):8.1f} ms a run, ratio {each / direct:.2f}"]
-    lines += [f"{'the same in processor time':34s} {1e3 * (guarded - work):8.1f} ms a run, start-up included"]
+    turns = []
+    for turn in range(repeats):
+        times, worked = [], spent()
+        for entry in idle.methods:
+            begun = time.perf_counter()
+            found = match(pair, entry.formulation, "native", limits=idle.limits)
+            assert found.correspondence is not None
+            score(data, found.correspondence.dense(len(data.part.vertices)))
+            times.append(time.perf_counter() - begun)
+        work, worked = spent() - worked, spent()
+        out = stage.folder / f"idle{turn}"
+        # As a user starts it: this process holds more than the command does, and is slower to fork.
+        if stage.start(out, "events.txt").wait():
+            raise SystemExit("the benchmark failed")
+        ended = np.sort([path.stat().st_mtime for path in (out / "runs").glob("*.json")])
+        turns.append((np.median(times), np.median(np.diff(ended)), (spent() - worked - work) / count))
+    direct, each, work = 1e3 * np.array(turns).T
+    lines = [f"{'direct match and score':34s} {spread(direct)} ms a run"]
+    lines += [f"{'run_plan, from record to record':34s} {spread(each)} ms a run"]
+    lines += [f"{'cost of the runner':34s} {spread(each - direct)} ms a run, ratio {np.median(each / direct):.2f}"]
+    lines += [f"{'the same in processor time':34s} {spread(work)} ms a run, start-up included"]
     rates = []
     slow = read_plan(plan(seconds))
     for workers in (1, 2):
@@ -88,6 +94,11 @@ def measure(stage: chaos.Stage, count: int, seconds: float) -> None:
         lines += [f"{f'throughput, {workers} worker(s)':34s} {rates[-1]:8.2f} runs a second"]
     lines += [f"{'ratio of two workers to one':34s} {rates[1] / rates[0]:8.2f}"]
     sys.stdout.write("\n".join(lines) + "\n")
+
+
+def spread(values: FloatArray) -> str:
+    """Return the median of some values and, in brackets, the least and the largest."""
+    return f"{np.median(values):8.1f} ({values.min():.1f} to {values.max():.1f})"
 
 
 def spent() -> float:
