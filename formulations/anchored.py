@@ -154,6 +154,7 @@ class Anchored:
         """State the game, then one map a step; return one point a vertex of the part."""
         bounds = (
             ("steps", 1, 1000), ("last_steps", 0, 1000), ("repeats", 0, 1000), ("starts", 1, len(STARTS)),
+            ("leash", 0, np.inf), ("straying", 0, np.inf),
         )  # fmt: skip
         for name, least, most in bounds:
             value = getattr(self, name)

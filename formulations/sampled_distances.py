@@ -17,6 +17,9 @@ from nonrigid.geometry.arrays import FloatArray, IntArray
 NEAR = 0.15
 """Distance, in units of sqrt(full area), at which the agreement with another sample counts 1/e."""
 
+_BLOCK = 2048
+"""Vertices that are placed at a time: a number for each point of the grid is in memory."""
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class SampledDistances:
@@ -174,8 +177,11 @@ class SampledDistances:
         samples = self.points[: len(self.on_part)]
         rows = self.on_grid(pair, nearest[samples])
         sure = self.surest(rows, share)
-        on_part = pair.part.distances(samples)[np.ix_(sure, unsure)]
-        around = self.grid[placing_cost(on_part, self.on_full[rows[sure]], reach=reach).argmin(axis=1)]
+        on_part, on_full = pair.part.distances(samples)[sure], self.on_full[rows[sure]]
+        around = np.empty(len(unsure), dtype=np.int64)
+        for start in range(0, len(unsure), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            around[block] = self.grid[placing_cost(on_part[:, unsure[block]], on_full, reach=reach).argmin(axis=1)]
         where = pair.full.mesh.vertices
         far = np.linalg.norm(where[nearest[unsure]] - where[around], axis=1) > length
         return unsure[far], around[far]
