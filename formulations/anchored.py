@@ -193,9 +193,8 @@ class Anchored:
         if self.last_steps:
             best = max(best, (yield from self._grown(pair, basis, samples, best.rows, self.last_steps)))
             best = yield from self._leashed(pair, basis, samples, best)
-        strays = partial(
-            samples.strays, pair, length=self.straying, share=self.kept, reach=self.local_reach, keeping=KEEPING
-        )
+        everywhere = np.arange(len(pair.part.mesh.vertices))
+        strays = partial(self._strays, pair, samples, everywhere)
         found, nearest = basis.read_off(best.C, pair.full.mesh, strays=strays, length=self.straying)
         confidence = samples.confidence(pair, np.arange(len(nearest)), nearest, width=KEEPING)
         if not self.between_vertices:
@@ -278,6 +277,7 @@ class Anchored:
         held = partial(
             samples.leashed,
             pair,
+            length=leash,
             share=self.kept,
             reach=self.local_reach,
             descriptor_weight=self.placing_weight,
@@ -288,10 +288,19 @@ class Anchored:
             samples.grid[rows],
             basis.sizes(self.first_size, steps),
             grid=samples.grid,
-            corrected=partial(held, length=leash) if leash < np.inf else None,
+            corrected=held if leash < np.inf else None,
         )
-        images = held(images, self.straying)
+        far, around = self._strays(pair, samples, samples.points, images)
+        images[far] = around
         return Grown(float(samples.confidence(pair, samples.points, images, width=KEEPING).mean()), C, rows, images)
+
+    def _strays(
+        self, pair: Pair, samples: SampledDistances, vertices: IntArray, nearest: IntArray
+    ) -> tuple[IntArray, IntArray]:
+        """Return which images are not believed, and near which vertices they should lie."""
+        return samples.strays(
+            pair, vertices, nearest, self.straying, share=self.kept, reach=self.local_reach, keeping=KEEPING
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -156,32 +156,43 @@ class SampledDistances:
         return np.where(np.linalg.norm(where[images] - where[placed], axis=1) > length, placed, images)
 
     def strays(
-        self, pair: Pair, nearest: IntArray, length: float, *, share: float, reach: float, keeping: float
+        self,
+        pair: Pair,
+        vertices: IntArray,
+        nearest: IntArray,
+        length: float,
+        *,
+        share: float,
+        reach: float,
+        keeping: float,
     ) -> tuple[IntArray, IntArray]:
-        """Return which vertices of the part lie off where the surest samples place them, and that place.
+        """Return which images lie off where the surest samples place the vertices of the part, and that place.
 
         Looked at are those whose distances to the samples are off by more than `keeping` on average: others are near.
 
         Parameters
         ----------
-        nearest
-            (n,) vertices of the full surface, one for each of the part.
+        vertices, nearest
+            (n,) vertices of the part, the first s samples among them, and a vertex of the full surface for each.
         length
             How far off is too far, in space.
 
         Returns
         -------
-        (k,) vertices of the part, and (k,) vertices of the full surface.
+        (k,) rows of `vertices`, and (k,) vertices of the full surface.
         """
-        unsure = np.flatnonzero(self._changes(pair, np.arange(len(nearest)), nearest) > keeping)
+        unsure = np.flatnonzero(self._changes(pair, vertices, nearest) > keeping)
         samples = self.points[: len(self.on_part)]
-        rows = self.on_grid(pair, nearest[samples])
+        row = np.empty(len(pair.part.mesh.vertices), dtype=np.int64)
+        row[vertices] = np.arange(len(vertices))
+        rows = self.on_grid(pair, nearest[row[samples]])
         sure = self.surest(rows, share)
         on_part, on_full = pair.part.distances(samples)[sure], self.on_full[rows[sure]]
         around = np.empty(len(unsure), dtype=np.int64)
         for start in range(0, len(unsure), _BLOCK):
             block = slice(start, start + _BLOCK)
-            around[block] = self.grid[placing_cost(on_part[:, unsure[block]], on_full, reach=reach).argmin(axis=1)]
+            place = placing_cost(on_part[:, vertices[unsure[block]]], on_full, reach=reach).argmin(axis=1)
+            around[block] = self.grid[place]
         where = pair.full.mesh.vertices
         far = np.linalg.norm(where[nearest[unsure]] - where[around], axis=1) > length
         return unsure[far], around[far]

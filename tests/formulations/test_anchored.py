@@ -130,7 +130,7 @@ def test_a_patch_sent_to_the_wrong_limb_is_brought_back(creature: PairData) -> N
     assert 1 < len(patch) < 0.05 * len(true)
     nearest = true.copy()
     nearest[patch] = wrong
-    rows, around = samples.strays(pair, nearest, 0.1, share=0.6, reach=0.12, keeping=KEEPING)
+    rows, around = samples.strays(pair, np.arange(len(nearest)), nearest, 0.1, share=0.6, reach=0.12, keeping=KEEPING)
     assert set(patch) <= set(rows)
     off = np.linalg.norm(where[around] - where[true[rows]], axis=1)
     assert np.quantile(off[np.isin(rows, patch)], 0.9) < 0.1
