@@ -96,8 +96,8 @@ class Anchored:
     first_size, steps, last_steps
         Eigenfunctions of the part in the first map, number of maps of each start, and of the best one once more, 0 for
         not once more: slower growth is mostly, but not always, better; the mean confidence decides.
-    components
-        Principal components of the descriptors that stand beside eigenfunctions while maps grow; in the end, all.
+    components, last_components
+        Principal components of the descriptors that stand beside eigenfunctions while maps grow, and in the end.
     starts, enough
         Largest number of starts, and the mean confidence at which no other is tried; the one with the highest mean
         confidence wins.
@@ -138,6 +138,7 @@ class Anchored:
     steps: int = 5
     last_steps: int = 20
     components: int = 80
+    last_components: int = 200
     starts: int = 4
     enough: float = 0.85
     repeats: int = 3
@@ -175,6 +176,7 @@ class Anchored:
             full_size=self.full_size,
             descriptor_weight=self.growing_weight,
             components=self.components,
+            last_components=self.last_components,
         )
         nothing = np.empty(0, dtype=np.int64)
         best = Grown(-1.0, np.empty((0, 0)), nothing, nothing)

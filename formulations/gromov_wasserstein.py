@@ -47,8 +47,8 @@ class PartialGromovWasserstein(GrowthSettings):
         Whether the even plan is tried as well.
     room
         Capacity over area of the full surface's samples: 1 for none to spare, more where areas are not kept.
-    radii, trust_power, fitted_samples, grid_samples, first_size, steps, descriptor_weight, components, part_size,
-    full_size
+    radii, trust_power, fitted_samples, grid_samples, first_size, steps, descriptor_weight, components, last_components,
+    part_size, full_size
         See `nonrigid.formulations.partial_zoomout.GrowthSettings`.
 
     Source: Chapel, Alaya and Gasso, partial optimal transport with applications on positive-unlabeled learning (NeurIPS

@@ -41,8 +41,8 @@ class GrowthSettings:
     descriptor_weight
         Squared length, in units of the full area, that a squared difference 1 of unit descriptors is worth beside
         eigenfunctions; 0 as published.
-    components
-        Principal components of the descriptors that stand beside eigenfunctions while maps grow; in the end, all.
+    components, last_components
+        Principal components of the descriptors that stand beside eigenfunctions while maps grow, and in the end.
     part_size, full_size
         Largest numbers of eigenfunctions.
     """
@@ -55,6 +55,7 @@ class GrowthSettings:
     steps: int = 20
     descriptor_weight: float = 0.004
     components: int = 80
+    last_components: int = 200
     part_size: int = 100
     full_size: int = 200
 
@@ -75,8 +76,8 @@ class PartialZoomOut(GrowthSettings):
         Whose matches are grown: "gt", "en" or "descriptors".
     part_samples, full_samples
         Samples of the start.
-    radii, trust_power, fitted_samples, grid_samples, first_size, steps, descriptor_weight, components, part_size,
-    full_size
+    radii, trust_power, fitted_samples, grid_samples, first_size, steps, descriptor_weight, components, last_components,
+    part_size, full_size
         See `GrowthSettings`.
 
     Source: Melzi, Ren, Rodola, Sharma, Wonka and Ovsjanikov, ZoomOut (SIGGRAPH Asia 2019), whose section on partial
@@ -137,12 +138,13 @@ def growth(
         full_size=settings.full_size,
         descriptor_weight=settings.descriptor_weight,
         components=settings.components,
+        last_components=settings.last_components,
     )
     sizes = basis.sizes(settings.first_size, settings.steps)
     C = (yield first_map(basis, part, full, sample_areas(pair.part, part), int(sizes[0])))["C"]
     points = pair.part.samples(min(settings.fitted_samples, len(pair.part.mesh.vertices)))
     grid = pair.full.samples(min(settings.grid_samples, len(pair.full.mesh.vertices)))
-    queries, features = basis.features(C, points, principal=True)
+    queries, features = basis.features(C, points, basis.components)
     images = grid[nearest_rows(queries, features[grid])[0]]
     C, _ = yield from grown(basis, points, images, sizes, grid=grid)
     found, nearest = basis.read_off(C, pair.full.mesh)

@@ -38,10 +38,11 @@ class Bases:
         (n, .) eigenfunctions, in 1 / sqrt(full area).
     share
         Eigenfunctions of the part to one of the full surface.
-    descriptors
-        Descriptors, with the trust in the part's.
-    principal
-        Rows of the part and of the full surface, (n, .) each: the same in few principal components.
+    looks
+        Descriptors of the part, as far as they are trusted, and of the full surface, (n, .) each, in principal
+        components: those of the largest second moment first.
+    components
+        How many of them stand beside eigenfunctions while maps grow; all do when a map is read off.
     descriptor_weight
         Squared distance, in units of the full area, that a squared difference 1 of descriptors is worth.
     """
@@ -49,8 +50,8 @@ class Bases:
     part: FloatArray
     full: FloatArray
     share: float
-    descriptors: TrustedDescriptors
-    principal: tuple[FloatArray, FloatArray]
+    looks: tuple[FloatArray, FloatArray]
+    components: int
     descriptor_weight: float
 
     def part_size(self, size: int) -> int:
@@ -66,18 +67,17 @@ class Bases:
         return np.linspace(min(first / self.share, last), last, steps).round().astype(np.int64)
 
     def features(
-        self, C: FloatArray, points: IntArray | slice, *, principal: bool = False
+        self, C: FloatArray, points: IntArray | slice, components: int | None = None
     ) -> tuple[FloatArray, FloatArray]:
         """Return rows for points of the part and for the full surface's vertices, near where the two are the same.
 
+        `components`: how many of the descriptors' take part; all unless given.
+
         Near by, |phi(y) - phi(y')|^2 over k eigenfunctions is about pi k^2 |y - y'|^2 by Weyl's law (area 1): this is
-        the scale at which descriptors stand beside them, whole or in their principal components.
+        the scale at which descriptors stand beside them.
         """
         size = len(C)
-        if principal:
-            looks, others = self.principal[0][points], self.principal[1]
-        else:
-            looks, others = self.descriptors.queries(points), self.descriptors.targets()
+        looks, others = self.looks[0][points, :components], self.looks[1][:, :components]
         weight = np.pi * size**2 * self.descriptor_weight
         queries = np.hstack([self.part[points, : C.shape[1]] @ C.T, weight * looks])
         return queries, np.hstack([self.full[:, :size], others])
@@ -113,24 +113,25 @@ def bases(
     full_size: int,
     descriptor_weight: float,
     components: int,
+    last_components: int,
 ) -> Bases:
     """Return the bases of a pair; a surface with too few vertices gives as many eigenfunctions as it has.
 
-    Of the descriptors the `components` with the largest second moment over the full surface are kept: 80 of 640 hold
-    more than nine tenths of it on the templates of SHREC'16.
+    Of the descriptors the `last_components` with the largest second moment over the full surface are kept: 80 of 640
+    hold more than nine tenths of it on the templates of SHREC'16.
     """
     part = pair.part.spectrum(min(part_size, len(pair.part.mesh.vertices) - 1))
     full = pair.full.spectrum(min(full_size, len(pair.full.mesh.vertices) - 1))
     reference = min(RANK_AT, len(full.eigenvalues))
     rank = estimated_rank(part.eigenvalues, full.eigenvalues[:reference])
     targets = descriptors.targets()
-    axes = principal_axes(targets, components)
+    axes = principal_axes(targets, max(components, last_components))
     return Bases(
         part=part.eigenfunctions,
         full=full.eigenfunctions,
         share=max(rank, 1) / reference,
-        descriptors=descriptors,
-        principal=(descriptors.queries(slice(None)) @ axes, targets @ axes),
+        looks=(descriptors.queries(slice(None)) @ axes, targets @ axes),
+        components=components,
         descriptor_weight=descriptor_weight,
     )
 
@@ -221,7 +222,7 @@ def grown(
         rough = np.asarray(np.linalg.lstsq(part, basis.full[images, :size], rcond=None)[0].T, dtype=np.float64)
         solution = yield map_fit("map", rough)
         C = solution["C"]
-        queries, features = basis.features(C, points, principal=True)
+        queries, features = basis.features(C, points, basis.components)
         coarse = number <= len(sizes) - FINE
         images = grid[nearest_rows(queries, features[grid])[0]] if coarse else nearest_rows(queries, features)[0]
     return C, images

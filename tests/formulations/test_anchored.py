@@ -72,10 +72,17 @@ def test_all_principal_components_measure_like_the_descriptors(creature: PairDat
     """A rotation of the descriptors' coordinates keeps their inner products, hence every nearest vertex."""
     pair = Pair.of(creature.part, creature.full)
     descriptors = trusted_descriptors(pair, SMALL.radii, power=1.0)
-    basis = bases(pair, descriptors, part_size=30, full_size=60, descriptor_weight=0.01, components=10**6)
+    settings = {"part_size": 30, "full_size": 60, "descriptor_weight": 0.01, "components": 10}
+    basis = bases(pair, descriptors, **settings, last_components=10**6)  # type: ignore[arg-type]
     C, points = np.eye(40, 20), np.arange(0, len(pair.part.mesh.vertices), 7)
-    whole, turned = (nearest_rows(*basis.features(C, points, principal=some)) for some in (False, True))
-    np.testing.assert_array_equal(whole[0], turned[0])
+    turned = basis.features(C, points)
+    weight = np.pi * len(C) ** 2 * basis.descriptor_weight
+    whole = (
+        np.hstack([turned[0][:, :40], weight * descriptors.queries(points)]),
+        np.hstack([turned[1][:, :40], descriptors.targets()]),
+    )
+    np.testing.assert_array_equal(nearest_rows(*whole)[0], nearest_rows(*turned)[0])
+    assert basis.features(C, points, basis.components)[0].shape == (len(points), 40 + 10)
 
 
 def test_every_vertex_of_a_creature_is_matched_well(creature: PairData, matched: Correspondence) -> None:

@@ -45,7 +45,9 @@ def test_a_start_from_descriptors_states_no_problem_of_its_own(pair: Pair) -> No
 
 def test_the_first_map_is_the_best_orthonormal_one_in_the_mean_over_areas(pair: Pair) -> None:
     descriptors = trusted_descriptors(pair, (0.15,), power=1.0)
-    basis = bases(pair, descriptors, part_size=30, full_size=60, descriptor_weight=0.0, components=10)
+    basis = bases(
+        pair, descriptors, part_size=30, full_size=60, descriptor_weight=0.0, components=10, last_components=10
+    )
     rng = np.random.default_rng(0)
     part, full = rng.integers(0, len(basis.part), 40), rng.integers(0, len(basis.full), 40)
     weight = sample_areas(pair.part, np.unique(part))[np.searchsorted(np.unique(part), part)]
