@@ -129,13 +129,17 @@ class SampledDistances:
 
     def _changes(self, pair: Pair, vertices: IntArray, nearest: IntArray) -> FloatArray:
         """Return the mean |d - D| of vertices to the first s samples, near ones counting most: a length."""
-        samples, image = self.points[: len(self.on_part)], self.on_grid(pair, nearest)
-        row = np.empty(len(pair.part.mesh.vertices), dtype=np.int64)
-        row[vertices] = np.arange(len(vertices))
-        on_part = pair.part.distances(samples)[:, vertices]
+        rows = self.on_grid(pair, nearest)
+        on_part = pair.part.distances(self.points[: len(self.on_part)])[:, vertices]
         weight = np.exp(-np.square(on_part / NEAR))
-        off = np.abs(on_part - self.on_full[np.ix_(image[row[samples]], image)])
+        off = np.abs(on_part - self.on_full[np.ix_(rows[self._first(pair, vertices)], rows)])
         return np.asarray((weight * off).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-300))
+
+    def _first(self, pair: Pair, vertices: IntArray) -> IntArray:
+        """Return where the first s samples stand among vertices of the part."""
+        place = np.empty(len(pair.part.mesh.vertices), dtype=np.int64)
+        place[vertices] = np.arange(len(vertices))
+        return place[self.points[: len(self.on_part)]]
 
     def leashed(
         self, pair: Pair, images: IntArray, length: float, *, share: float, reach: float, descriptor_weight: float
@@ -182,12 +186,10 @@ class SampledDistances:
         (k,) rows of `vertices`, and (k,) vertices of the full surface.
         """
         unsure = np.flatnonzero(self._changes(pair, vertices, nearest) > keeping)
-        samples = self.points[: len(self.on_part)]
-        row = np.empty(len(pair.part.mesh.vertices), dtype=np.int64)
-        row[vertices] = np.arange(len(vertices))
-        rows = self.on_grid(pair, nearest[row[samples]])
+        rows = self.on_grid(pair, nearest[self._first(pair, vertices)])
         sure = self.surest(rows, share)
-        on_part, on_full = pair.part.distances(samples)[sure], self.on_full[rows[sure]]
+        on_part = pair.part.distances(self.points[: len(self.on_part)])[sure]
+        on_full = self.on_full[rows[sure]]
         around = np.empty(len(unsure), dtype=np.int64)
         for start in range(0, len(unsure), _BLOCK):
             block = slice(start, start + _BLOCK)
