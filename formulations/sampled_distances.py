@@ -152,6 +152,10 @@ class SampledDistances:
             (p,) vertices of the full surface.
         length
             In space, in units of sqrt(full area).
+        share, reach, descriptor_weight
+            See `surest` and `placed`.
+
+        Source: this package.
         """
         rows = self.on_grid(pair, images)
         sure = self.surest(rows, share)
@@ -179,11 +183,17 @@ class SampledDistances:
         vertices, nearest
             (n,) vertices of the part, the first s samples among them, and a vertex of the full surface for each.
         length
-            How far off is too far, in space.
+            How far off is too far, in space, in units of sqrt(full area).
+        share, reach
+            See `surest` and `placed`.
+        keeping
+            In units of sqrt(full area).
 
         Returns
         -------
         (k,) rows of `vertices`, and (k,) vertices of the full surface.
+
+        Source: this package.
         """
         unsure = np.flatnonzero(self._changes(pair, vertices, nearest) > keeping)
         rows = self.on_grid(pair, nearest[self._first(pair, vertices)])

@@ -164,7 +164,13 @@ def nearest_within(
     places
         (t, 3) where the targets lie.
     around
-        (q,) target in whose neighbourhood each query looks.
+        (q,) target in whose neighbourhood each query looks; it is always among those looked at.
+    length
+        In the unit of `places`.
+
+    Returns
+    -------
+    (q,) targets.
 
     Examples
     --------

@@ -72,8 +72,9 @@ def test_all_principal_components_measure_like_the_descriptors(creature: PairDat
     """A rotation of the descriptors' coordinates keeps their inner products, hence every nearest vertex."""
     pair = Pair.of(creature.part, creature.full)
     descriptors = trusted_descriptors(pair, SMALL.radii, power=1.0)
-    settings = {"part_size": 30, "full_size": 60, "descriptor_weight": 0.01, "components": 10}
-    basis = bases(pair, descriptors, **settings, last_components=10**6)  # type: ignore[arg-type]
+    basis = bases(
+        pair, descriptors, part_size=30, full_size=60, descriptor_weight=0.01, components=10, last_components=10**6
+    )
     C, points = np.eye(40, 20), np.arange(0, len(pair.part.mesh.vertices), 7)
     turned = basis.features(C, points)
     weight = np.pi * len(C) ** 2 * basis.descriptor_weight
@@ -123,6 +124,17 @@ def test_a_map_that_stays_unsure_is_started_in_every_way(creature: PairData) -> 
         solution.problem for solution in match(Pair.of(part, creature.full), replace(hopeless, enough=0.0)).solutions
     ]
     assert sure[:3] == ["game", "map", "map"]
+
+
+def test_a_map_that_stays_unsure_also_grows_on_a_leash(creature: PairData) -> None:
+    pair = Pair.of(random_rigid_motion(creature.part)[0], creature.full)
+    few = replace(SMALL, starts=1, enough=0.0, repeats=1, steps=2, last_steps=3)
+    counts = {
+        unsure: [solution.problem for solution in match(pair, replace(few, unsure=unsure)).solutions].count("map")
+        for unsure in (0.0, 2.0)
+    }
+    assert counts[0.0] == 2 + 3
+    assert counts[2.0] == counts[0.0] + len(LAST_STARTS) * 2 + 3
 
 
 def test_a_patch_sent_to_the_wrong_limb_is_brought_back(creature: PairData) -> None:
