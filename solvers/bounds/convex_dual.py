@@ -9,14 +9,15 @@ import numpy as np
 
 from nonrigid.formulations.model import Problem
 from nonrigid.formulations.model.terms.gram_penalty import GramPenalty
-from nonrigid.geometry.arrays import FloatArray
+from nonrigid.geometry.arrays import BoolArray, FloatArray
 from nonrigid.solvers.backends.native.reweighted import RobustRegression, robust_regression
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.solution import Bound
 from nonrigid.solvers.solve import solve
 
 _EPS = float(np.finfo(float).eps)
-_FITTED = 1e-5  # residuals shorter than this share of the longest count as zero
+_FITTED = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2)
+"""Residuals shorter than such a share of the longest count as zero; each gives a bound, and the highest is taken."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +29,8 @@ class ConvexDual:
 
         bound = -<Y, B> + sum_ij min over |c - C0_ij| <= rho of (Y A')_ij c + W_ij^2 c^2.
 
-    Y comes from the residual of a reweighted solve C0, so an inexact solve gives a looser bound, never a wrong one. No
+    Y comes from the residual of a reweighted solve C0, so an inexact solve gives a looser bound, never a wrong one. On
+    columns that are fitted exactly the solve is slow to say so: several guesses of which these are give several Y. No
     minimizer C is farther from C0 than rho = 2 f(C0) / (w s), s the least singular value of A: the data at both is at
     most f(C0). A penalty of the Gram matrix is dropped, being nowhere negative, so the bound then holds, but is that of
     the convex part. Rounding of the sums is taken off.
@@ -53,7 +55,8 @@ class ConvexDual:
         regression = robust_regression(convex)
         assert isinstance(regression, RobustRegression)
         nothing = np.zeros(convex.variables[0].shape)  # any matrix gives a bound, also where no pass was ended in time
-        value = _dual_value(regression, solution.values.get(convex.variables[0].name, nothing))
+        found = solution.values.get(convex.variables[0].name, nothing)
+        value = max(_dual_value(regression, found, fitted) for fitted in _FITTED)
         detail = f"convex part {solution.objective:.9g} by {solution.evaluations:.0f} passes"
         constant = problem.objective.constant
         return Bound(constant + value, "convex_dual", time.perf_counter() - begun, detail)
@@ -72,12 +75,12 @@ def _convex_part(problem: Problem) -> Problem | str:
     return found if isinstance(found, str) else convex
 
 
-def _dual_value(regression: RobustRegression, C: FloatArray) -> float:
-    """Return the bound, rounding taken off."""
+def _dual_value(regression: RobustRegression, C: FloatArray, fitted: float) -> float:
+    """Return the bound, rounding taken off; `fitted`: one of `_FITTED`."""
     A, B, w, W = regression.data.source, regression.data.target, regression.weight, regression.mask
     residual = C @ A - B
     lengths = np.linalg.norm(residual, axis=0)
-    Y = _multipliers(regression, C, residual, lengths)
+    Y = _multipliers(regression, C, residual, lengths <= fitted * float(lengths.max(initial=0.0)))
     count = A.shape[1]
     slope = Y @ A.T
     doubt = 2.0 * count * _EPS * (np.abs(Y) @ np.abs(A).T)
@@ -91,20 +94,20 @@ def _dual_value(regression: RobustRegression, C: FloatArray) -> float:
     return max(value, 0.0) if np.isfinite(value) else 0.0  # no term is negative
 
 
-def _multipliers(regression: RobustRegression, C: FloatArray, residual: FloatArray, lengths: FloatArray) -> FloatArray:
+def _multipliers(regression: RobustRegression, C: FloatArray, residual: FloatArray, fitted: BoolArray) -> FloatArray:
     """Return columns no longer than the weight: along the residuals, and where these vanish to balance the rest.
 
     At the optimum Y A' + 2 C o W o W = 0; a column that is fitted exactly gives Y no direction of its own.
     """
     A, weight = regression.data.source, regression.weight
     shrink = weight * (1.0 - 4.0 * (len(residual) + 4) * _EPS)  # whatever the rounding
-    fitted = lengths <= _FITTED * float(lengths.max(initial=0.0))
+    lengths = np.linalg.norm(residual, axis=0)
     Y = residual * np.divide(shrink, lengths, out=np.zeros_like(lengths), where=~fitted)
     if fitted.any():
         rest = Y @ A.T + 2.0 * C * regression.mask**2
         Y[:, fitted] = np.linalg.lstsq(A[:, fitted], -rest.T, rcond=None)[0].T
         Y *= np.minimum(1.0, shrink / np.maximum(np.linalg.norm(Y, axis=0), 1e-300))
-    return Y
+    return np.asarray(Y)
 
 
 def _least_of_parabolas(slope: FloatArray, sign: FloatArray, W: FloatArray, C: FloatArray, radius: float) -> FloatArray:

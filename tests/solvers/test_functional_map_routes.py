@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from nonrigid.formulations.functional_maps import slanted_mask
@@ -60,6 +60,8 @@ def region_step(side: int, seed: int) -> Problem:
 
 
 @settings(max_examples=8, deadline=None)
+@example(216084, 3)  # a column fitted exactly, which 200 passes leave at 1e-4 to 1e-3 of the longest residual
+@example(218, 3)
 @given(st.integers(0, 10**6), st.integers(3, 6))
 def test_the_dual_bound_lies_below_what_is_found_and_close_to_it(seed: int, size: int) -> None:
     problem, limits = map_step(size, seed), Limits(evaluations=200)
