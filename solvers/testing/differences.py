@@ -15,16 +15,16 @@ _Value = TypeVar("_Value", float, FloatArray)
 def along(function: Callable[[FloatArray], _Value], x: FloatArray, direction: FloatArray, step: float = 1e-3) -> _Value:
     """Return the derivative of a function along a direction by Richardson's extrapolation of central differences.
 
-    (4 D(h/2) - D(h)) / 3 with D(h) = (f(x + h d) - f(x - h d)) / 2h: the error falls as h^4, so that h need not be
-    small and rounding does no harm.
+    (64 D(h/4) - 20 D(h/2) + D(h)) / 45 with D(h) = (f(x + h d) - f(x - h d)) / 2h: the error falls as h^6, so that h
+    need not be small and rounding does no harm.
 
     Examples
     --------
     >>> round(along(lambda x: float(x[0] ** 3), np.array([2.0]), np.array([1.0])), 8)
     12.0
     """
-    coarse, fine = _central(function, x, direction, step), _central(function, x, direction, 0.5 * step)
-    return (4.0 * fine - coarse) / 3.0
+    coarse, fine, finest = (_central(function, x, direction, share * step) for share in (1.0, 0.5, 0.25))
+    return (64.0 * finest - 20.0 * fine + coarse) / 45.0
 
 
 def directions(shape: tuple[int, ...], rng: np.random.Generator, most: int = 24) -> Iterator[FloatArray]:
