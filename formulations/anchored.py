@@ -36,7 +36,7 @@ class Start:
     kernel_width, mix
         Factors of the settings of the same name.
     bridged
-        Whether the game's distances on the part may cross what was cut out; all others go along it.
+        Whether distances on the part may cross what was cut out, or go along it.
     peeled
         Whether the anchors are those of `GameTheoretic` without its second game, on that method's samples of the full
         surface: groups peeled off, and merged.
@@ -48,10 +48,10 @@ class Start:
     peeled: bool = False
 
 
-STARTS = (Start(), Start(kernel_width=2 / 3, bridged=False), Start(peeled=True), Start(bridged=False))
+STARTS = (Start(), Start(kernel_width=5 / 3, mix=1.6), Start(peeled=True), Start(kernel_width=2 / 3, mix=0.6))
 """Starts in the order in which they are tried."""
 
-LAST_STARTS = (Start(kernel_width=2 / 3, mix=0.6), Start(kernel_width=5 / 3, mix=1.6, bridged=False))
+LAST_STARTS = (Start(kernel_width=2 / 3, bridged=False), Start(kernel_width=5 / 3, mix=1.6, bridged=False))
 """Starts that are tried while these leave the best map unsure: few anchors, and many."""
 
 
@@ -63,11 +63,11 @@ class Anchored:
     2. Distances to the anchors place every sample of the part. Those whose distances to their neighbours agree best
        become the next anchors, nearer ones; and again.
     3. "map": a functional map with orthonormal columns is fitted to the samples and better images are read off it, with
-       ever more eigenfunctions.
-    4. Where the mean confidence of the best map from several starts is low, its best images become anchors in their
-       turn, and steps 2 and 3 are done again while that makes it surer.
-    5. Where it stays low, as on parts torn by many holes, maps also grow on a leash: before each fit, images far from
-       where the surest ones place them are put there.
+       ever more eigenfunctions. Where its mean confidence is low, as on parts torn by many holes, it also grows on a
+       leash: before each fit, images far from where the surest ones place them are put there.
+    4. Several starts are tried, which differ in the game and in whether ways on the part may cross what was cut out.
+    5. Where the mean confidence of the best map stays low, its best images become anchors in their turn, and steps 2
+       and 3 are done again while that makes it surer.
     6. The last map reads off every vertex, images that stray looked for again near where the surest ones place them,
        and a point of a triangle around the best vertex.
 
@@ -98,6 +98,9 @@ class Anchored:
         not once more: slower growth is mostly, but not always, better; the mean confidence decides.
     components, last_components
         Principal components of the descriptors that stand beside eigenfunctions while maps grow, and in the end.
+    bridged
+        Whether starts may measure ways on the part across what was cut out; see
+        `nonrigid.geometry.geodesics.BridgedGeodesics`.
     starts, enough
         Largest number of starts, and the mean confidence at which no other is tried; the one with the highest mean
         confidence wins.
@@ -139,6 +142,7 @@ class Anchored:
     last_steps: int = 20
     components: int = 80
     last_components: int = 200
+    bridged: bool = True
     starts: int = 4
     enough: float = 0.85
     repeats: int = 3
@@ -162,7 +166,7 @@ class Anchored:
             if not least <= value <= most:
                 raise InputError(f"{name} is {value}", remedy=f"give a number from {least} to {most}")
         descriptors = trusted_descriptors(pair, self.radii, power=self.trust_power)
-        samples = sampled_distances(
+        along = sampled_distances(
             pair,
             descriptors,
             part_samples=self.part_samples,
@@ -178,33 +182,36 @@ class Anchored:
             components=self.components,
             last_components=self.last_components,
         )
+        ground = Ground(pair, basis, along, along.measured(pair, "bridged") if self.bridged else along)
         nothing = np.empty(0, dtype=np.int64)
         best = Grown(-1.0, np.empty((0, 0)), nothing, nothing)
         for start in STARTS[: self.starts]:
-            rows = yield from self._anchored(pair, samples, start)
-            best = max(best, (yield from self._grown(pair, basis, samples, rows, self.steps)))
+            rows = yield from self._anchored(ground, start)
+            best = max(best, (yield from self._tried(ground, rows)))
             if best.score >= self.enough:
                 break
-        best = yield from self._repeated(pair, basis, samples, best)
+        best = yield from self._repeated(ground, best)
         for start in LAST_STARTS:
             if best.score >= self.unsure:
                 break
-            rows = yield from self._anchored(pair, samples, start)
-            other = yield from self._grown(pair, basis, samples, rows, self.steps)
-            best = max(best, (yield from self._repeated(pair, basis, samples, other)))
+            rows = yield from self._anchored(ground, start)
+            other = yield from self._tried(ground, rows)
+            best = max(best, (yield from self._repeated(ground, other)))
         if self.last_steps:
-            best = max(best, (yield from self._grown(pair, basis, samples, best.rows, self.last_steps)))
-            best = yield from self._leashed(pair, basis, samples, best)
+            if best.score >= self.unsure:
+                best = max(best, (yield from self._grown(ground, best.rows, self.last_steps)))
+            best = yield from self._leashed(ground, best)
         everywhere = np.arange(len(pair.part.mesh.vertices))
-        strays = partial(self._strays, pair, samples, everywhere)
+        strays = partial(self._strays, ground, everywhere)
         found, nearest = basis.read_off(best.C, pair.full.mesh, strays=strays, length=self.straying)
-        confidence = samples.confidence(pair, np.arange(len(nearest)), nearest, width=KEEPING)
+        confidence = ground.confidence(everywhere, nearest)
         if not self.between_vertices:
-            return Correspondence.between_vertices(pair, np.arange(len(nearest)), nearest, confidence)
+            return Correspondence.between_vertices(pair, everywhere, nearest, confidence)
         return Correspondence.of_every_vertex(pair, found, confidence)
 
-    def _anchored(self, pair: Pair, samples: SampledDistances, start: Start) -> Generator[Problem, Solved, IntArray]:
+    def _anchored(self, ground: Ground, start: Start) -> Generator[Problem, Solved, IntArray]:
         """Play the games of a start, and place the samples by their winners and then by one another."""
+        samples = ground.bridged if start.bridged else ground.along
         width = self.kernel_width * start.kernel_width
         weight = self.placing_weight
         if start.peeled:
@@ -213,21 +220,17 @@ class Anchored:
                 part_samples=self.part_samples,
                 per_sample=self.per_sample,
                 kernel_width=width,
-                geodesics="bridged" if start.bridged else "dijkstra",
+                geodesics=samples.geodesics,
                 local_candidates=0,
             )
-            part, full = (yield from peeling.stages(pair)).view_vertices(pair)
-            on_part = pair.part.distances(part)[:, samples.points]
-            on_full = pair.full.distances(full)[:, samples.grid]
+            part, full = (yield from peeling.stages(ground.pair)).view_vertices(ground.pair)
+            on_part = ground.pair.part.distances(part, samples.geodesics)[:, samples.points]
+            on_full = ground.pair.full.distances(full)[:, samples.grid]
             images = samples.placed_by(on_part, on_full, reach=self.reach, descriptor_weight=weight)
         else:
             matches = samples.candidates(self.per_sample)
             share = (
-                yield game(
-                    "game",
-                    samples.payoff(matches, width, bridged=start.bridged),
-                    ElasticNet(mix=min(self.mix * start.mix, 1.0)),
-                )
+                yield game("game", samples.payoff(matches, width), ElasticNet(mix=min(self.mix * start.mix, 1.0)))
             )["u"]
             anchors = matches[matches.greedy(share, floor=self.floor)]
             images = samples.placed(anchors.part, anchors.full, reach=self.reach, descriptor_weight=weight)
@@ -240,69 +243,90 @@ class Anchored:
             images = samples.placed(sure, images[sure], reach=self.local_reach, descriptor_weight=self.placing_weight)
         return images
 
-    def _repeated(
-        self, pair: Pair, basis: Bases, samples: SampledDistances, best: Grown
-    ) -> Generator[Problem, Solved, Grown]:
+    def _again(self, ground: Ground, images: IntArray) -> IntArray:
+        """Place all samples anew from the images of a map."""
+        return self._settled(ground.bridged, ground.bridged.on_grid(ground.pair, images))
+
+    def _tried(self, ground: Ground, rows: IntArray) -> Generator[Problem, Solved, Grown]:
+        """Grow a map from images of the samples, and where it is unsure, on a leash as well; return the surer one."""
+        free = yield from self._grown(ground, rows, self.steps)
+        if free.score >= self.unsure:
+            return free
+        return max(free, (yield from self._grown(ground, rows, self.steps, leash=self.leash)))
+
+    def _repeated(self, ground: Ground, best: Grown) -> Generator[Problem, Solved, Grown]:
         """Grow a map again from its own images, placed anew, while that makes it surer."""
         for _ in range(self.repeats if best.score < self.enough else 0):
-            rows = self._settled(samples, samples.on_grid(pair, best.images))
-            before, best = best, max(best, (yield from self._grown(pair, basis, samples, rows, self.steps)))
+            before, best = best, max(best, (yield from self._tried(ground, self._again(ground, best.images))))
             if best.score < before.score + _GAIN:
                 break
         return best
 
-    def _leashed(
-        self, pair: Pair, basis: Bases, samples: SampledDistances, best: Grown
-    ) -> Generator[Problem, Solved, Grown]:
+    def _leashed(self, ground: Ground, best: Grown) -> Generator[Problem, Solved, Grown]:
         """Grow a map on a leash, and again from its own images, while the best is unsure and that makes it surer."""
         rows = best.rows
         for _ in range(self.repeats):
             if best.score >= self.unsure:
                 break
-            other = yield from self._grown(pair, basis, samples, rows, self.last_steps, leash=self.leash)
+            other = yield from self._grown(ground, rows, self.last_steps, leash=self.leash)
             if other.score < best.score + _GAIN:
                 break
-            best, rows = other, self._settled(samples, samples.on_grid(pair, other.images))
+            best, rows = other, self._again(ground, other.images)
         return best
 
     def _grown(
-        self,
-        pair: Pair,
-        basis: Bases,
-        samples: SampledDistances,
-        rows: IntArray,
-        steps: int,
-        *,
-        leash: float = np.inf,
+        self, ground: Ground, rows: IntArray, steps: int, *, leash: float = np.inf
     ) -> Generator[Problem, Solved, Grown]:
         """Grow a map from images of the samples, and score it by its images, strays among them put right."""
+        samples = ground.bridged
         held = partial(
             samples.leashed,
-            pair,
+            ground.pair,
             length=leash,
             share=self.kept,
             reach=self.local_reach,
             descriptor_weight=self.placing_weight,
         )
         C, images = yield from grown(
-            basis,
+            ground.basis,
             samples.points,
             samples.grid[rows],
-            basis.sizes(self.first_size, steps),
+            ground.basis.sizes(self.first_size, steps),
             grid=samples.grid,
             corrected=held if leash < np.inf else None,
         )
-        far, around = self._strays(pair, samples, samples.points, images)
+        far, around = self._strays(ground, samples.points, images)
         images[far] = around
-        return Grown(float(samples.confidence(pair, samples.points, images, width=KEEPING).mean()), C, rows, images)
+        score = ground.confidence(samples.points, images).mean()
+        return Grown(float(score), C, rows, images)
 
-    def _strays(
-        self, pair: Pair, samples: SampledDistances, vertices: IntArray, nearest: IntArray
-    ) -> tuple[IntArray, IntArray]:
+    def _strays(self, ground: Ground, vertices: IntArray, nearest: IntArray) -> tuple[IntArray, IntArray]:
         """Return which images are not believed, and near which vertices they should lie."""
-        return samples.strays(
-            pair, vertices, nearest, self.straying, share=self.kept, reach=self.local_reach, keeping=KEEPING
+        return ground.along.strays(
+            ground.pair, vertices, nearest, self.straying, share=self.kept, reach=self.local_reach, keeping=KEEPING
         )
+
+
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """Hold what maps of a pair are made of, and samples with distances on the part measured in two ways.
+
+    Along the part, ways around what was cut out are too long; across it, some are too short. Maps grow from samples
+    placed by the latter, which are nearer the truth on parts torn by many holes, and are judged by both: what is
+    wrong in one way rarely looks right in the other.
+    """
+
+    pair: Pair
+    basis: Bases
+    along: SampledDistances
+    bridged: SampledDistances
+
+    def confidence(self, vertices: IntArray, nearest: IntArray) -> FloatArray:
+        """Return how well a map keeps distances, the mean of both ways; see `SampledDistances.confidence`."""
+        along, bridged = (
+            way.confidence(self.pair, vertices, nearest, width=KEEPING) for way in (self.along, self.bridged)
+        )
+        return np.asarray(0.5 * (along + bridged))
 
 
 @dataclass(frozen=True, eq=False)

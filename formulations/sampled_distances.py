@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -35,22 +35,26 @@ class SampledDistances:
         (g,) vertices of the full surface.
     on_part, on_full
         (s, p) and (g, g) distances, in units of sqrt(full area).
+    geodesics
+        How distances on the part are measured; see `nonrigid.geometry.geodesics.make_geodesics`.
     unlike
         (p, g) squared differences of descriptors, as far as the part's are trusted.
     looks
         (s, g) the same as if all were trusted.
-    across
-        (s, s) distances between the first s samples by ways that may cross what was cut out; see
-        `nonrigid.geometry.geodesics.BridgedGeodesics`.
     """
 
     points: IntArray
     grid: IntArray
     on_part: FloatArray
     on_full: FloatArray
+    geodesics: str
     unlike: FloatArray
     looks: FloatArray
-    across: FloatArray
+
+    def measured(self, pair: Pair, geodesics: str) -> SampledDistances:
+        """Return the same samples with distances on the part measured in another way."""
+        first = self.points[: len(self.on_part)]
+        return replace(self, geodesics=geodesics, on_part=pair.part.distances(first, geodesics)[:, self.points])
 
     @property
     def between(self) -> FloatArray:
@@ -66,13 +70,9 @@ class SampledDistances:
         rows = np.repeat(np.arange(len(best)), best.shape[1])
         return Candidates(rows, best.ravel(), self.looks[rows, best.ravel()])
 
-    def payoff(self, matches: Candidates, kernel_width: float, *, bridged: bool) -> FloatArray:
-        """Return the (n, n) two-sided payoff; see `nonrigid.formulations.distortion.consistency`.
-
-        `bridged`: distances on the part are `across`, else those along it.
-        """
-        between = self.across if bridged else self.between
-        excess = between[np.ix_(matches.part, matches.part)]
+    def payoff(self, matches: Candidates, kernel_width: float) -> FloatArray:
+        """Return the (n, n) two-sided payoff; see `nonrigid.formulations.distortion.consistency`."""
+        excess = self.between[np.ix_(matches.part, matches.part)]
         excess -= self.on_full[np.ix_(matches.full, matches.full)]
         return payoff_of(excess, matches, kernel_width)
 
@@ -130,7 +130,7 @@ class SampledDistances:
     def _changes(self, pair: Pair, vertices: IntArray, nearest: IntArray) -> FloatArray:
         """Return the mean |d - D| of vertices to the first s samples, near ones counting most: a length."""
         rows = self.on_grid(pair, nearest)
-        on_part = pair.part.distances(self.points[: len(self.on_part)])[:, vertices]
+        on_part = pair.part.distances(self.points[: len(self.on_part)], self.geodesics)[:, vertices]
         weight = np.exp(-np.square(on_part / NEAR))
         off = np.abs(on_part - self.on_full[np.ix_(rows[self._first(pair, vertices)], rows)])
         return np.asarray((weight * off).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-300))
@@ -198,7 +198,7 @@ class SampledDistances:
         unsure = np.flatnonzero(self._changes(pair, vertices, nearest) > keeping)
         rows = self.on_grid(pair, nearest[self._first(pair, vertices)])
         sure = self.surest(rows, share)
-        on_part = pair.part.distances(self.points[: len(self.on_part)])[sure]
+        on_part = pair.part.distances(self.points[: len(self.on_part)], self.geodesics)[sure]
         on_full = self.on_full[rows[sure]]
         around = np.empty(len(unsure), dtype=np.int64)
         for start in range(0, len(unsure), _BLOCK):
@@ -222,6 +222,7 @@ def sampled_distances(
     part_samples: int,
     placed_samples: int,
     full_samples: int,
+    geodesics: str = "dijkstra",
 ) -> SampledDistances:
     """Sample both surfaces and measure; a surface with too few vertices gives all of them.
 
@@ -234,9 +235,9 @@ def sampled_distances(
     return SampledDistances(
         points=points,
         grid=grid,
-        on_part=part.distances(points[:part_samples])[:, points],
+        on_part=part.distances(points[:part_samples], geodesics)[:, points],
         on_full=full.distances_between(grid),
+        geodesics=geodesics,
         unlike=descriptors.differences(points, grid),
         looks=descriptors.all_trusted().differences(points[:part_samples], grid),
-        across=part.distances_between(points[:part_samples], "bridged"),
     )
