@@ -26,6 +26,9 @@ KEEPING = 0.03
 _GAIN = 0.002
 """Mean confidence that a map has to gain when it grows again, for another time to be worth it."""
 
+_HELD = 0.02
+"""Mean confidence that a map has to gain on a leash: it is held to images that keep distances, wrong ones as well."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
@@ -203,8 +206,7 @@ class Anchored:
             other = yield from self._tried(ground, rows)
             best = max(best, (yield from self._repeated(ground, other)))
         if self.last_steps:
-            if best.score >= self.unsure:
-                best = max(best, (yield from self._grown(ground, best.rows, self.last_steps)))
+            best = max(best, (yield from self._grown(ground, best.rows, self.last_steps)))
             best = yield from self._leashed(ground, best)
         everywhere = np.arange(len(pair.part.mesh.vertices))
         strays = partial(self._strays, ground, everywhere)
@@ -257,7 +259,8 @@ class Anchored:
         free = yield from self._grown(ground, rows, self.steps)
         if free.score >= self.unsure:
             return free
-        return max(free, (yield from self._grown(ground, rows, self.steps, leash=self.leash)))
+        held = yield from self._grown(ground, rows, self.steps, leash=self.leash)
+        return held if held.score >= free.score + _HELD else free
 
     def _repeated(self, ground: Ground, best: Grown) -> Generator[Problem, Solved, Grown]:
         """Grow a map again from its own images, placed anew, while that makes it surer."""
