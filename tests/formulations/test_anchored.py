@@ -133,7 +133,7 @@ def test_a_map_that_stays_unsure_also_grows_on_a_leash(creature: PairData) -> No
         for unsure in (0.0, 2.0)
     }
     assert counts[0.0] == 2 + 3
-    assert counts[2.0] == 2 * 2 * (1 + len(LAST_STARTS)) + 3
+    assert counts[2.0] == 2 * 2 * (1 + len(LAST_STARTS)) + 3 + 3
 
 
 def test_a_patch_sent_to_the_wrong_limb_is_brought_back(creature: PairData) -> None:
