@@ -322,6 +322,15 @@ class Ground:
     Along the part, ways around what was cut out are too long; across it, some are too short. Maps grow from samples
     placed by the latter, which are nearer the truth on parts torn by many holes, and are judged by both: what is
     wrong in one way rarely looks right in the other.
+
+    Parameters
+    ----------
+    pair, basis
+        What is matched, and the eigenfunctions and descriptors of both surfaces.
+    along, bridged
+        The same samples, with distances on the part along it, and across what was cut out.
+
+    Source: this package.
     """
 
     pair: Pair
@@ -330,7 +339,13 @@ class Ground:
     bridged: SampledDistances
 
     def confidence(self, vertices: IntArray, nearest: IntArray) -> FloatArray:
-        """Return how well a map keeps distances, the mean of both ways; see `SampledDistances.confidence`."""
+        """Return (n,) how well a map keeps distances, 0 to 1, the mean of both ways.
+
+        Parameters
+        ----------
+        vertices, nearest
+            (n,) each; see `SampledDistances.confidence`.
+        """
         along, bridged = (
             way.confidence(self.pair, vertices, nearest, width=KEEPING) for way in (self.along, self.bridged)
         )

@@ -52,7 +52,20 @@ class SampledDistances:
     looks: FloatArray
 
     def measured(self, pair: Pair, geodesics: str) -> SampledDistances:
-        """Return the same samples with distances on the part measured in another way."""
+        """Return the same samples with distances on the part measured in another way.
+
+        Parameters
+        ----------
+        pair
+            The pair that was sampled.
+        geodesics
+            A name that `nonrigid.geometry.geodesics.make_geodesics` knows.
+
+        Raises
+        ------
+        InputError
+            If it knows no such name.
+        """
         first = self.points[: len(self.on_part)]
         return replace(self, geodesics=geodesics, on_part=pair.part.distances(first, geodesics)[:, self.points])
 
@@ -222,9 +235,8 @@ def sampled_distances(
     part_samples: int,
     placed_samples: int,
     full_samples: int,
-    geodesics: str = "dijkstra",
 ) -> SampledDistances:
-    """Sample both surfaces and measure; a surface with too few vertices gives all of them.
+    """Sample both surfaces and measure, on the part along it; a surface with too few vertices gives all of them.
 
     The distances of the full surface depend on nothing else and are kept in the cache; so are those from the first
     `part_samples` samples of the part.
@@ -235,9 +247,9 @@ def sampled_distances(
     return SampledDistances(
         points=points,
         grid=grid,
-        on_part=part.distances(points[:part_samples], geodesics)[:, points],
+        on_part=part.distances(points[:part_samples])[:, points],
         on_full=full.distances_between(grid),
-        geodesics=geodesics,
+        geodesics="dijkstra",
         unlike=descriptors.differences(points, grid),
         looks=descriptors.all_trusted().differences(points[:part_samples], grid),
     )

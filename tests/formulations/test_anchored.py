@@ -13,7 +13,7 @@ from scipy.stats import ortho_group
 from nonrigid.benchmark.datasets.protocols import PairData
 from nonrigid.benchmark.datasets.shrec16 import Shrec16
 from nonrigid.benchmark.protocol import random_rigid_motion, score
-from nonrigid.formulations.anchored import KEEPING, LAST_STARTS, STARTS, Anchored
+from nonrigid.formulations.anchored import KEEPING, LAST_STARTS, STARTS, Anchored, Ground
 from nonrigid.formulations.formulation import Correspondence, Pair
 from nonrigid.formulations.interpolation import closest_feature_points
 from nonrigid.formulations.sampled_distances import sampled_distances
@@ -134,6 +134,23 @@ def test_a_map_that_stays_unsure_also_grows_on_a_leash(creature: PairData) -> No
     }
     assert counts[0.0] == 2 + 3
     assert counts[2.0] == 2 * 2 * (1 + len(LAST_STARTS)) + 3 + 3
+
+
+def test_ways_across_what_was_cut_out_are_never_longer_and_count_half(creature: PairData) -> None:
+    pair = Pair.of(creature.part, creature.full)
+    descriptors = trusted_descriptors(pair, SMALL.radii, power=1.0)
+    along = sampled_distances(pair, descriptors, part_samples=200, placed_samples=400, full_samples=700)
+    bridged = along.measured(pair, "bridged")
+    assert (bridged.on_part <= along.on_part + 1e-9).all()
+    assert (bridged.on_part < along.on_part - 1e-3).any()
+    assert bridged.measured(pair, "dijkstra").on_part.tobytes() == along.on_part.tobytes()
+    basis = bases(
+        pair, descriptors, part_size=30, full_size=60, descriptor_weight=0.01, components=9, last_components=9
+    )
+    ground = Ground(pair, basis, along, bridged)
+    images = pair.full.samples(len(along.points))
+    each = [way.confidence(pair, along.points, images, width=KEEPING) for way in (along, bridged)]
+    assert np.allclose(ground.confidence(along.points, images), np.mean(each, axis=0))
 
 
 def test_a_patch_sent_to_the_wrong_limb_is_brought_back(creature: PairData) -> None:
