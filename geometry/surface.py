@@ -61,6 +61,7 @@ class Surface:
         self.raw = mesh
         self._cache = default_cache() if cache == "default" else Cache(None) if cache is None else cache
         self._made: dict[str, Any] = {}
+        self._squares: dict[str, list[tuple[IntArray, FloatArray]]] = {}
 
     def __repr__(self) -> str:
         return f"Surface({self.raw.name}: {len(self.raw.vertices)} vertices, {len(self.raw.faces)} faces)"
@@ -160,11 +161,17 @@ class Surface:
     def distances_between(self, vertices: ArrayLike, method: str = "dijkstra", *, keep: bool = True) -> FloatArray:
         """Return the (s, s) distances along the surface between the given vertices, in the unit of the vertices.
 
-        The rows are computed a block at a time, so that memory stays small. `keep=False` says that another run will
-        hardly ask for these vertices: the answer is then kept in memory only.
+        The rows are computed a block at a time, so that memory stays small; what an earlier answer for more vertices
+        holds is taken from there. `keep=False` says that another run will hardly ask for these vertices: the answer is
+        then kept in memory only.
         """
         wanted, method = np.asarray(vertices, dtype=np.int64).reshape(-1), self._same_as(method)
         ascending, place = np.unique(wanted, return_inverse=True)
+        squares = self._squares.setdefault(method, [])
+        for known, larger in squares:
+            if np.isin(ascending, known, assume_unique=True).all():
+                rows = np.searchsorted(known, wanted)
+                return larger if np.array_equal(wanted, known) else larger[np.ix_(rows, rows)]
         key = ("between", method, ascending)
 
         def fresh() -> dict[str, FloatArray]:
@@ -172,9 +179,8 @@ class Surface:
             made = self._geodesics(method)
             return {"square": np.vstack([made.distances(block)[:, ascending] for block in blocks])}
 
-        square: FloatArray = self._remember(
-            content_hash(*key), lambda: self._stored(key, fresh)["square"] if keep else _frozen(fresh()["square"])
-        )
+        square: FloatArray = self._stored(key, fresh)["square"] if keep else _frozen(fresh()["square"])
+        squares.append((ascending, square))
         return square if np.array_equal(wanted, ascending) else square[np.ix_(place, place)]
 
     def scaled(self, factor: float) -> Surface:

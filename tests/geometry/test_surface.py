@@ -60,6 +60,20 @@ def test_shapes_and_order_of_sources() -> None:
         found["shot"][0] = 1
 
 
+@pytest.mark.parametrize("method", ["dijkstra", "heat"])
+def test_distances_between_some_of_the_vertices_of_an_earlier_answer_are_taken_from_it(
+    tmp_path: Path, method: str
+) -> None:
+    surface, cache = Surface(bumpy(), cache=Cache(tmp_path)), Cache(tmp_path)
+    surface.distances_between([9, 4, 30, 2], method)
+    for some in ([30, 4], [2, 9, 2], [2, 4, 9, 30]):
+        alone = Surface(bumpy(), cache=None).distances_between(some, method)
+        assert surface.distances_between(some, method).tobytes() == alone.tobytes()
+    assert cache.info().entries == 1
+    surface.distances_between([9, 5], method)
+    assert cache.info().entries == 2
+
+
 def test_large_distance_matrices_are_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     surface = Surface(bumpy(), cache=Cache(tmp_path))
     kept = surface.distances([3, 1])
