@@ -12,16 +12,21 @@ import numpy as np
 from nonrigid.formulations.formulation import Correspondence, Pair, Solved, Stages
 from nonrigid.formulations.game_theoretic import GameTheoretic
 from nonrigid.formulations.games import game
+from nonrigid.formulations.local_rigidity import locally_rigid
 from nonrigid.formulations.model import ElasticNet, Problem
 from nonrigid.formulations.sampled_distances import SampledDistances, sampled_distances
 from nonrigid.formulations.spectral_growth import Bases, bases, grown
 from nonrigid.formulations.trusted_descriptors import trusted_descriptors
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.errors import InputError
+from nonrigid.geometry.remesh import closest_points
 
 KEEPING = 0.03
 """Mean change of distances, in units of sqrt(full area), at which a match has confidence 1/2."""
 
+
+SUPPORTS = 10_000
+"""Vertices of a full surface that are enough for its parts' motions; those of finer ones are thinned to samples."""
 
 _GAIN = 0.002
 """Mean confidence that a map has to gain when it grows again, for another time to be worth it."""
@@ -78,6 +83,7 @@ class Anchored:
        and 3 are done again while that makes it surer.
     6. The last map reads off every vertex, images that stray looked for again near where the surest ones place them,
        and a point of a triangle around the best vertex.
+    7. Each image moves to where the rigid motion puts it that takes its neighbours to their images.
 
     Descriptors take part in each step; after the games, by how far they can be trusted: near its boundary a part does
     not look like the whole.
@@ -121,6 +127,9 @@ class Anchored:
         a map grows on a leash, and in the end.
     part_size, full_size
         Largest numbers of eigenfunctions.
+    rigid_rounds, rigid_reach, rigid_tolerance
+        How often, in the end, each image moves to where its neighbours' put it, 0 for never; see
+        `nonrigid.formulations.local_rigidity.locally_rigid`. Lengths in units of sqrt(full area).
     between_vertices
         Whether a match may lie inside a triangle of the full surface; else it is the best vertex.
 
@@ -159,6 +168,9 @@ class Anchored:
     straying: float = 0.1
     part_size: int = 100
     full_size: int = 200
+    rigid_rounds: int = 2
+    rigid_reach: float = 0.05
+    rigid_tolerance: float = 0.005
     between_vertices: bool = True
 
     method: ClassVar[str] = "anchored"
@@ -168,6 +180,7 @@ class Anchored:
         bounds = (
             ("steps", 1, 1000), ("last_steps", 0, 1000), ("repeats", 0, 1000), ("starts", 1, len(STARTS)),
             ("leash", 0, np.inf), ("straying", 0, np.inf),
+            ("rigid_rounds", 0, 1000), ("rigid_reach", 1e-6, np.inf), ("rigid_tolerance", 1e-6, np.inf),
         )  # fmt: skip
         for name, least, most in bounds:
             value = getattr(self, name)
@@ -211,6 +224,9 @@ class Anchored:
         everywhere = np.arange(len(pair.part.mesh.vertices))
         strays = partial(self._strays, ground, everywhere)
         found, nearest = basis.read_off(best.C, pair.full.mesh, strays=strays, length=self.straying)
+        for _ in range(self.rigid_rounds):
+            found = closest_points(pair.full.mesh, self._rigid(pair, found.positions(pair.full.mesh)))
+        nearest = found.nearest_corner(pair.full.mesh) if self.rigid_rounds else nearest
         confidence = ground.confidence(everywhere, nearest)
         if not self.between_vertices:
             return Correspondence.between_vertices(pair, everywhere, nearest, confidence)
@@ -307,6 +323,21 @@ class Anchored:
         images[far] = around
         score = ground.confidence(samples.points, images).mean()
         return Grown(float(score), C, rows, images)
+
+    def _rigid(self, pair: Pair, images: FloatArray) -> FloatArray:
+        """Return (n, 3) images of all vertices of the part, each moved to where those of its neighbours put it."""
+        mesh = pair.part.mesh
+        enough = int(np.ceil(SUPPORTS * pair.kept_area))
+        fine = len(mesh.vertices) > 2 * enough
+        among = np.sort(pair.part.samples(enough)) if fine else np.arange(len(mesh.vertices))
+        return locally_rigid(
+            mesh.vertices,
+            mesh.vertex_normals,
+            images,
+            among=among,
+            reach=self.rigid_reach,
+            tolerance=self.rigid_tolerance,
+        )
 
     def _strays(self, ground: Ground, vertices: IntArray, nearest: IntArray) -> tuple[IntArray, IntArray]:
         """Return which images are not believed, and near which vertices they should lie."""
