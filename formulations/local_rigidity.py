@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from nonrigid.geometry.arrays import FloatArray, IntArray
 
 NEIGHBOURS = 120
-"""Largest number of neighbours that a motion is fitted to; at 10,000 vertices they reach as far as 0.06 of sqrt(area)."""
+"""Largest number of neighbours that a motion is fitted to: at 10,000 vertices they reach 0.06 of sqrt(area) far."""
 
 ROUNDS = 4
 """How often a motion is fitted; in the second and later ones, neighbours that do not move with the rest count less."""
@@ -58,9 +58,10 @@ def locally_rigid(
     Source: rigid moving least squares, Schaefer, McPhail and Warren, "Image deformation using moving least squares",
     SIGGRAPH 2006, section 2.3; the loss is this package's choice.
     """
-    gap, near = cKDTree(points[among]).query(points, k=min(NEIGHBOURS, len(among)))
-    near = among[near.reshape(len(points), -1)]
-    weight = np.exp(-np.square(gap.reshape(near.shape) / reach))
+    ranks = np.arange(1, min(NEIGHBOURS, len(among)) + 1)
+    gap, near = (np.asarray(found) for found in cKDTree(points[among]).query(points, k=ranks))
+    near = among[near]
+    weight = np.exp(-np.square(gap / reach))
     weight -= weight[:, -1:]  # the farthest may be one of several equally far, of which others were left out
     moved = np.empty_like(points)
     for start in range(0, len(points), _BLOCK):
