@@ -110,6 +110,13 @@ def test_order_frame_and_scale_change_nothing(creature: PairData, matched: Corre
         assert np.quantile(apart, 0.99) < 1e-3
 
 
+def test_images_that_move_together_are_nearer_the_truth(creature: PairData, matched: Correspondence) -> None:
+    apart = found(creature, random_rigid_motion(creature.part)[0], creature.full, replace(SMALL, rigid_rounds=0))
+    count = len(creature.part.vertices)
+    together, alone = (score(creature, images.dense(count)).mean_error for images in (matched, apart))
+    assert together < 0.9 * alone
+
+
 def test_a_map_that_stays_unsure_is_started_in_every_way(creature: PairData) -> None:
     part = random_rigid_motion(creature.part)[0]
     hopeless = replace(SMALL, starts=len(STARTS), enough=2.0, unsure=2.0, repeats=1, steps=2, last_steps=0)
@@ -191,7 +198,9 @@ def test_matches_can_be_kept_to_vertices_and_the_slow_growth_be_left_out(creatur
     assert (result.correspondence.points.barycentric.max(axis=1) == 1.0).all()
 
 
-@pytest.mark.parametrize("settings", [{"steps": 0}, {"starts": 5}, {"last_steps": -1}, {"leash": -0.1}])
+@pytest.mark.parametrize(
+    "settings", [{"steps": 0}, {"starts": 5}, {"last_steps": -1}, {"leash": -0.1}, {"rigid_reach": 0.0}]
+)
 def test_numbers_out_of_range_are_refused(creature: PairData, settings: dict[str, int]) -> None:
     with pytest.raises(InputError, match=f"{next(iter(settings))} is .*give a number from"):
         match(Pair.of(creature.part, creature.full), replace(SMALL, **settings))  # type: ignore[arg-type]
