@@ -68,19 +68,23 @@ def locally_rigid(
         rows = slice(start, start + _BLOCK)
         facing = np.einsum("nkx,nx->nk", normals[near[rows]], normals[rows])
         sure = weight[rows] * np.maximum(facing, 0.0) + 1e-12
-        moved[rows] = _moved(points[near[rows]] - points[rows, None], images[near[rows]], sure, tolerance)
+        offsets = (points[near[rows]] - points[rows, None]).transpose(0, 2, 1)
+        targets = images[near[rows]].transpose(0, 2, 1)
+        moved[rows] = _moved(np.ascontiguousarray(offsets), np.ascontiguousarray(targets), sure, tolerance)
     return moved
 
 
 def _moved(offsets: FloatArray, images: FloatArray, weight: FloatArray, tolerance: float) -> FloatArray:
-    """Return (n, 3) where motions of (n, k, 3) offsets to their images put the offset zero."""
+    """Return (n, 3) where motions of (n, 3, k) offsets to their images put the offset zero."""
     share = weight
     for _ in range(ROUNDS):
         share = share / share.sum(axis=1, keepdims=True)
-        centre, target = np.einsum("nk,nkx->nx", share, offsets), np.einsum("nk,nkx->nx", share, images)
-        from_, to = offsets - centre[:, None], images - target[:, None]
-        left, _, right = np.linalg.svd((from_ * share[:, :, None]).transpose(0, 2, 1) @ to)
-        turn = left @ right
-        residual = np.linalg.norm(to - from_ @ turn, axis=2)
-        share = weight / (1.0 + np.square(residual / tolerance))
-    return np.asarray(target - (centre[:, None] @ turn)[:, 0])
+        centre, target = (offsets @ share[:, :, None])[:, :, 0], (images @ share[:, :, None])[:, :, 0]
+        moments = (offsets * share[:, None]) @ images.transpose(0, 2, 1) - centre[:, :, None] * target[:, None]
+        left, _, right = np.linalg.svd(moments)
+        turn = right.transpose(0, 2, 1) @ left.transpose(0, 2, 1)
+        moved = target - (turn @ centre[:, :, None])[:, :, 0]
+        apart = images - turn @ offsets
+        apart -= moved[:, :, None]
+        share = weight / (1.0 + np.einsum("nxk,nxk->nk", apart, apart) / tolerance**2)
+    return np.asarray(moved)
