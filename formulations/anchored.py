@@ -34,6 +34,10 @@ _GAIN = 0.002
 _HELD = 0.02
 """Mean confidence that a map has to gain on a leash: it is held to images that keep distances, wrong ones as well."""
 
+_LIKENESS = 5.0
+"""What the mean likeness of descriptors counts beside mean confidence when maps of a pair are compared: maps that keep
+distances equally well, such as one slid along a limb or one that swaps two, differ in it."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Start:
@@ -79,8 +83,9 @@ class Anchored:
        ever more eigenfunctions. Where its mean confidence is low, as on parts torn by many holes, it also grows on a
        leash: before each fit, images far from where the surest ones place them are put there.
     4. Several starts are tried, which differ in the game and in whether ways on the part may cross what was cut out.
+       Of two maps the better one has the higher mean confidence, with the likeness of descriptors counted in.
     5. Where the mean confidence of the best map stays low, its best images become anchors in their turn, and steps 2
-       and 3 are done again while that makes it surer.
+       and 3 are done again while that makes it better.
     6. The last map reads off every vertex, images that stray looked for again near where the surest ones place them,
        and a point of a triangle around the best vertex.
     7. Each image moves to where the rigid motion puts it that takes its neighbours to their images.
@@ -109,15 +114,14 @@ class Anchored:
         Samples of the part to which functional maps are fitted.
     first_size, steps, last_steps
         Eigenfunctions of the part in the first map, number of maps of each start, and of the best one once more, 0 for
-        not once more: slower growth is mostly, but not always, better; the mean confidence decides.
+        not once more: slower growth is mostly, but not always, better.
     components, last_components
         Principal components of the descriptors that stand beside eigenfunctions while maps grow, and in the end.
     bridged
         Whether starts may measure ways on the part across what was cut out; see
         `nonrigid.geometry.geodesics.BridgedGeodesics`.
     starts, enough
-        Largest number of starts, and the mean confidence at which no other is tried; the one with the highest mean
-        confidence wins.
+        Largest number of starts, and the mean confidence at which no other is tried.
     repeats
         How often, at most, the images of a map that is not sure enough become anchors again.
     unsure
@@ -205,7 +209,7 @@ class Anchored:
         )
         ground = Ground(pair, basis, along, along.measured(pair, "bridged") if self.bridged else along)
         nothing = np.empty(0, dtype=np.int64)
-        best = Grown(-1.0, np.empty((0, 0)), nothing, nothing)
+        best = Grown(-1.0, -np.inf, np.empty((0, 0)), nothing, nothing)
         for start in STARTS[: self.starts]:
             rows = yield from self._anchored(ground, start)
             best = max(best, (yield from self._tried(ground, rows)))
@@ -271,29 +275,29 @@ class Anchored:
         return self._settled(ground.bridged, ground.bridged.on_grid(ground.pair, images))
 
     def _tried(self, ground: Ground, rows: IntArray) -> Generator[Problem, Solved, Grown]:
-        """Grow a map from images of the samples, and where it is unsure, on a leash as well; return the surer one."""
+        """Grow a map from images of the samples, and where it is unsure, on a leash as well; return the better one."""
         free = yield from self._grown(ground, rows, self.steps)
         if free.score >= self.unsure:
             return free
         held = yield from self._grown(ground, rows, self.steps, leash=self.leash)
-        return held if held.score >= free.score + _HELD else free
+        return held if held.worth >= free.worth + _HELD else free
 
     def _repeated(self, ground: Ground, best: Grown) -> Generator[Problem, Solved, Grown]:
-        """Grow a map again from its own images, placed anew, while that makes it surer."""
+        """Grow a map again from its own images, placed anew, while that makes it better."""
         for _ in range(self.repeats if best.score < self.enough else 0):
             before, best = best, max(best, (yield from self._tried(ground, self._again(ground, best.images))))
-            if best.score < before.score + _GAIN:
+            if best.worth < before.worth + _GAIN:
                 break
         return best
 
     def _leashed(self, ground: Ground, best: Grown) -> Generator[Problem, Solved, Grown]:
-        """Grow a map on a leash, and again from its own images, while the best is unsure and that makes it surer."""
+        """Grow a map on a leash, and again from its own images, while the best is unsure and that makes it better."""
         rows = best.rows
         for _ in range(self.repeats):
             if best.score >= self.unsure:
                 break
             other = yield from self._grown(ground, rows, self.last_steps, leash=self.leash)
-            if other.score < best.score + _GAIN:
+            if other.worth < best.worth + _GAIN:
                 break
             best, rows = other, self._again(ground, other.images)
         return best
@@ -321,8 +325,9 @@ class Anchored:
         )
         far, around = self._strays(ground, samples.points, images)
         images[far] = around
-        score = ground.confidence(samples.points, images).mean()
-        return Grown(float(score), C, rows, images)
+        score = float(ground.confidence(samples.points, images).mean())
+        likeness = float(ground.basis.likeness(samples.points, images).mean())
+        return Grown(score, score + _LIKENESS * likeness, C, rows, images)
 
     def _rigid(self, pair: Pair, images: FloatArray) -> FloatArray:
         """Return (n, 3) images of all vertices of the part, each moved to where those of its neighbours put it."""
@@ -385,12 +390,16 @@ class Ground:
 
 @dataclass(frozen=True, eq=False)
 class Grown:
-    """Hold a functional map, the mean confidence of what is read off it, the images it grew from and those read off."""
+    """Hold a functional map, the images it grew from and those read off it, and how good these are.
+
+    `score` is their mean confidence; `worth`, by which maps of a pair are compared, counts their looks as well.
+    """
 
     score: float
+    worth: float
     C: FloatArray
     rows: IntArray
     images: IntArray
 
     def __lt__(self, other: Grown) -> bool:
-        return self.score < other.score
+        return self.worth < other.worth

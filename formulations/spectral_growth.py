@@ -82,6 +82,10 @@ class Bases:
         queries = np.hstack([self.part[points, : C.shape[1]] @ C.T, weight * looks])
         return queries, np.hstack([self.full[:, :size], others])
 
+    def likeness(self, points: IntArray, vertices: IntArray) -> FloatArray:
+        """Return the (n,) trusted cosines of the descriptors of points of the part and vertices of the full surface."""
+        return np.asarray(np.einsum("nd,nd->n", self.looks[0][points], self.looks[1][vertices]))
+
     def read_off(
         self, C: FloatArray, full: Mesh, *, strays: Strays | None = None, length: float = np.inf
     ) -> tuple[SurfacePoints, IntArray]:

@@ -204,3 +204,14 @@ def test_matches_can_be_kept_to_vertices_and_the_slow_growth_be_left_out(creatur
 def test_numbers_out_of_range_are_refused(creature: PairData, settings: dict[str, int]) -> None:
     with pytest.raises(InputError, match=f"{next(iter(settings))} is .*give a number from"):
         match(Pair.of(creature.part, creature.full), replace(SMALL, **settings))  # type: ignore[arg-type]
+
+
+def test_likeness_is_the_trusted_cosine_of_descriptors(creature: PairData) -> None:
+    pair = Pair.of(creature.part, creature.full)
+    seen = trusted_descriptors(pair, SMALL.radii, power=1.0)
+    every = 32 * 10 * len(SMALL.radii)
+    whole = bases(pair, seen, part_size=5, full_size=9, descriptor_weight=1.0, components=80, last_components=every)
+    points, vertices = np.array([3, 50, 7]), np.array([8, 1, 90])
+    expected = (seen.queries(points) * seen.targets()[vertices]).sum(axis=1)
+    np.testing.assert_allclose(whole.likeness(points, vertices), expected, atol=1e-9)
+    assert (np.abs(expected) <= 1.0 + 1e-9).all()
