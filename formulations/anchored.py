@@ -35,8 +35,8 @@ _HELD = 0.02
 """Mean confidence that a map has to gain on a leash: it is held to images that keep distances, wrong ones as well."""
 
 _LIKENESS = 5.0
-"""What the mean likeness of descriptors counts beside mean confidence when maps of a pair are compared: maps that keep
-distances equally well, such as one slid along a limb or one that swaps two, differ in it."""
+"""What the mean likeness of descriptors counts beside mean confidence when maps of a pair are compared: a map that
+is slid along a limb may keep distances as well as the true one, but its descriptors agree less."""
 
 
 @dataclass(frozen=True, kw_only=True)
