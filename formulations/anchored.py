@@ -12,31 +12,20 @@ import numpy as np
 from nonrigid.formulations.formulation import Correspondence, Pair, Solved, Stages
 from nonrigid.formulations.game_theoretic import GameTheoretic
 from nonrigid.formulations.games import game
-from nonrigid.formulations.local_rigidity import locally_rigid
+from nonrigid.formulations.judged_maps import KEEPING, Ground, Grown
+from nonrigid.formulations.local_rigidity import moved_together
 from nonrigid.formulations.model import ElasticNet, Problem
 from nonrigid.formulations.sampled_distances import SampledDistances, sampled_distances
-from nonrigid.formulations.spectral_growth import Bases, bases, grown
+from nonrigid.formulations.spectral_growth import bases, grown
 from nonrigid.formulations.trusted_descriptors import trusted_descriptors
-from nonrigid.geometry.arrays import FloatArray, IntArray
+from nonrigid.geometry.arrays import IntArray
 from nonrigid.geometry.errors import InputError
-from nonrigid.geometry.remesh import closest_points
-
-KEEPING = 0.03
-"""Mean change of distances, in units of sqrt(full area), at which a match has confidence 1/2."""
-
-
-SUPPORTS = 10_000
-"""Vertices of a full surface that are enough for its parts' motions; those of finer ones are thinned to samples."""
 
 _GAIN = 0.002
 """Mean confidence that a map has to gain when it grows again, for another time to be worth it."""
 
 _HELD = 0.02
 """Mean confidence that a map has to gain on a leash: it is held to images that keep distances, wrong ones as well."""
-
-_LIKENESS = 5.0
-"""What the mean likeness of descriptors counts beside mean confidence when maps of a pair are compared: a map that
-is slid along a limb may keep distances as well as the true one, but its descriptors agree less."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -229,7 +218,7 @@ class Anchored:
         strays = partial(self._strays, ground, everywhere)
         found, nearest = basis.read_off(best.C, pair.full.mesh, strays=strays, length=self.straying)
         for _ in range(self.rigid_rounds):
-            found = closest_points(pair.full.mesh, self._rigid(pair, found.positions(pair.full.mesh)))
+            found = moved_together(pair, found, reach=self.rigid_reach, tolerance=self.rigid_tolerance)
         nearest = found.nearest_corner(pair.full.mesh) if self.rigid_rounds else nearest
         confidence = ground.confidence(everywhere, nearest)
         if not self.between_vertices:
@@ -325,81 +314,10 @@ class Anchored:
         )
         far, around = self._strays(ground, samples.points, images)
         images[far] = around
-        score = float(ground.confidence(samples.points, images).mean())
-        likeness = float(ground.basis.likeness(samples.points, images).mean())
-        return Grown(score, score + _LIKENESS * likeness, C, rows, images)
-
-    def _rigid(self, pair: Pair, images: FloatArray) -> FloatArray:
-        """Return (n, 3) images of all vertices of the part, each moved to where those of its neighbours put it."""
-        mesh = pair.part.mesh
-        enough = int(np.ceil(SUPPORTS * pair.kept_area))
-        fine = len(mesh.vertices) > 2 * enough
-        among = np.sort(pair.part.samples(enough)) if fine else np.arange(len(mesh.vertices))
-        return locally_rigid(
-            mesh.vertices,
-            mesh.vertex_normals,
-            images,
-            among=among,
-            reach=self.rigid_reach,
-            tolerance=self.rigid_tolerance,
-        )
+        return ground.judged(C, rows, images)
 
     def _strays(self, ground: Ground, vertices: IntArray, nearest: IntArray) -> tuple[IntArray, IntArray]:
         """Return which images are not believed, and near which vertices they should lie."""
         return ground.along.strays(
             ground.pair, vertices, nearest, self.straying, share=self.kept, reach=self.local_reach, keeping=KEEPING
         )
-
-
-@dataclass(frozen=True, eq=False)
-class Ground:
-    """Hold what maps of a pair are made of, and samples with distances on the part measured in two ways.
-
-    Along the part, ways around what was cut out are too long; across it, some are too short. Maps grow from samples
-    placed by the latter, which are nearer the truth on parts torn by many holes, and are judged by both: what is
-    wrong in one way rarely looks right in the other.
-
-    Parameters
-    ----------
-    pair, basis
-        What is matched, and the eigenfunctions and descriptors of both surfaces.
-    along, bridged
-        The same samples, with distances on the part along it, and across what was cut out.
-
-    Source: this package.
-    """
-
-    pair: Pair
-    basis: Bases
-    along: SampledDistances
-    bridged: SampledDistances
-
-    def confidence(self, vertices: IntArray, nearest: IntArray) -> FloatArray:
-        """Return (n,) how well a map keeps distances, 0 to 1, the mean of both ways.
-
-        Parameters
-        ----------
-        vertices, nearest
-            (n,) each; see `SampledDistances.confidence`.
-        """
-        along, bridged = (
-            way.confidence(self.pair, vertices, nearest, width=KEEPING) for way in (self.along, self.bridged)
-        )
-        return np.asarray(0.5 * (along + bridged))
-
-
-@dataclass(frozen=True, eq=False)
-class Grown:
-    """Hold a functional map, the images it grew from and those read off it, and how good these are.
-
-    `score` is their mean confidence; `worth`, by which maps of a pair are compared, counts their looks as well.
-    """
-
-    score: float
-    worth: float
-    C: FloatArray
-    rows: IntArray
-    images: IntArray
-
-    def __lt__(self, other: Grown) -> bool:
-        return self.worth < other.worth

@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from nonrigid.formulations.formulation import Pair
 from nonrigid.geometry.arrays import FloatArray, IntArray
+from nonrigid.geometry.points import SurfacePoints
+from nonrigid.geometry.remesh import closest_points
 
 NEIGHBOURS = 120
 """Largest number of neighbours that a motion is fitted to: at 10,000 vertices they reach 0.06 of sqrt(area) far."""
@@ -13,8 +16,34 @@ NEIGHBOURS = 120
 ROUNDS = 4
 """How often a motion is fitted; in the second and later ones, neighbours that do not move with the rest count less."""
 
+SUPPORTS = 10_000
+"""Vertices of a full surface that are enough for its parts' motions; those of finer ones are thinned to samples."""
+
 _BLOCK = 4096
 """Points at a time: a few hundred numbers of each are in memory."""
+
+
+def moved_together(pair: Pair, images: SurfacePoints, *, reach: float, tolerance: float) -> SurfacePoints:
+    """Return images of all vertices of the part, each moved to where those of its neighbours put it, on the surface.
+
+    Parameters
+    ----------
+    images
+        (n,) points of the full surface, one a vertex of the part.
+    reach, tolerance
+        In units of sqrt(full area); see `locally_rigid`.
+
+    Returns
+    -------
+    (n,) points of the full surface, the closest to where `locally_rigid` puts them.
+    """
+    mesh = pair.part.mesh
+    enough = int(np.ceil(SUPPORTS * pair.kept_area))
+    fine = len(mesh.vertices) > 2 * enough
+    among = np.sort(pair.part.samples(enough)) if fine else np.arange(len(mesh.vertices))
+    places = images.positions(pair.full.mesh)
+    moved = locally_rigid(mesh.vertices, mesh.vertex_normals, places, among=among, reach=reach, tolerance=tolerance)
+    return closest_points(pair.full.mesh, moved)
 
 
 def locally_rigid(

@@ -13,9 +13,10 @@ from scipy.stats import ortho_group
 from nonrigid.benchmark.datasets.protocols import PairData
 from nonrigid.benchmark.datasets.shrec16 import Shrec16
 from nonrigid.benchmark.protocol import random_rigid_motion, score
-from nonrigid.formulations.anchored import KEEPING, LAST_STARTS, STARTS, Anchored, Ground
+from nonrigid.formulations.anchored import LAST_STARTS, STARTS, Anchored
 from nonrigid.formulations.formulation import Correspondence, Pair
 from nonrigid.formulations.interpolation import closest_feature_points
+from nonrigid.formulations.judged_maps import KEEPING, Ground
 from nonrigid.formulations.sampled_distances import sampled_distances
 from nonrigid.formulations.spectral_growth import bases, map_fit
 from nonrigid.formulations.trusted_descriptors import trusted_descriptors
