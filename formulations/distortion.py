@@ -15,6 +15,8 @@ from nonrigid.geometry.errors import InputError, UnknownNameError
 Sides: TypeAlias = Literal["two-sided", "one-sided", "certified"]
 SIDES = ("two-sided", "one-sided", "certified")
 
+_TILE = 256
+
 
 def distortion(
     pair: Pair,
@@ -52,8 +54,8 @@ def distortion(
     part, of_part = _distinct(matches.part)
     full, of_full = _distinct(matches.full)
     on_part = pair.part.distances_between(part, geodesics)
-    excess = on_part[np.ix_(of_part, of_part)]
-    excess -= pair.full.distances_between(full, geodesics, keep=keep)[np.ix_(of_full, of_full)]
+    excess = between_all(on_part, of_part)
+    excess -= between_all(pair.full.distances_between(full, geodesics, keep=keep), of_full)
     if sides == "two-sided":
         return np.abs(excess, out=excess)
     weight = np.full(on_part.shape, excess_weight)
@@ -61,7 +63,7 @@ def distortion(
         weight[certified_pairs(pair.part.mesh, pair.part.distances(part), part)] = 1.0
     longer = excess > 0.0
     np.abs(excess, out=excess)
-    excess[longer] *= weight[np.ix_(of_part, of_part)][longer]
+    excess[longer] *= between_all(weight, of_part)[longer]
     return excess
 
 
@@ -112,10 +114,26 @@ def payoff_of(disagreement: FloatArray, matches: Candidates, kernel_width: float
     payoff *= -np.log(2.0) / kernel_width**2
     np.exp(payoff, out=payoff)
     payoff[matches.conflicts()] = 0.0
-    # Distances on a mesh are symmetric up to rounding only.
-    payoff += payoff.T.copy()
-    payoff *= 0.5
+    # Distances on a mesh are symmetric up to rounding only. A transposed copy of the whole would take far longer.
+    for i in range(0, len(payoff), _TILE):
+        for j in range(0, i + _TILE, _TILE):
+            upper, lower = payoff[j : j + _TILE, i : i + _TILE], payoff[i : i + _TILE, j : j + _TILE]
+            lower[:] = 0.5 * (lower + upper.T)
+            upper[:] = lower.T
     return payoff
+
+
+def between_all(square: FloatArray, rows: IntArray) -> FloatArray:
+    """Return square[rows][:, rows], columns first: far faster than both at once where `rows` are many.
+
+    Examples
+    --------
+    >>> between_all(np.array([[0.0, 1.0], [1.0, 0.0]]), np.array([1, 1, 0]))
+    array([[0., 0., 1.],
+           [0., 0., 1.],
+           [1., 1., 0.]])
+    """
+    return square.take(rows, axis=1).take(rows, axis=0)
 
 
 def _distinct(vertices: IntArray) -> tuple[IntArray, IntArray]:

@@ -16,7 +16,6 @@ from nonrigid.formulations.spectral_growth import Bases, bases, grown, map_fit
 from nonrigid.formulations.trusted_descriptors import TrustedDescriptors, trusted_descriptors
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.errors import InputError, UnknownNameError
-from nonrigid.geometry.maps import nearest_rows
 from nonrigid.geometry.surface import Surface
 
 From: TypeAlias = Literal["gt", "en", "descriptors"]
@@ -144,9 +143,7 @@ def growth(
     C = (yield first_map(basis, part, full, sample_areas(pair.part, part), int(sizes[0])))["C"]
     points = pair.part.samples(min(settings.fitted_samples, len(pair.part.mesh.vertices)))
     grid = pair.full.samples(min(settings.grid_samples, len(pair.full.mesh.vertices)))
-    queries, features = basis.features(C, points, basis.components)
-    images = grid[nearest_rows(queries, features[grid])[0]]
-    C, _ = yield from grown(basis, points, images, sizes, grid=grid)
+    C, _ = yield from grown(basis, points, basis.images(C, points, grid), sizes, grid=grid)
     found, nearest = basis.read_off(C, pair.full.mesh)
     # Weyl's law: features of k eigenfunctions are about sqrt(pi) k times as far apart as the points (area 1).
     apart = np.linalg.norm(basis.part[:, : C.shape[1]] @ C.T - basis.full[nearest, : len(C)], axis=1)

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from nonrigid.formulations.candidates import Candidates
-from nonrigid.formulations.distortion import payoff_of
+from nonrigid.formulations.distortion import between_all, payoff_of
 from nonrigid.formulations.formulation import Pair
 from nonrigid.formulations.localisation import placing_cost
 from nonrigid.formulations.trusted_descriptors import TrustedDescriptors
@@ -85,8 +85,8 @@ class SampledDistances:
 
     def payoff(self, matches: Candidates, kernel_width: float) -> FloatArray:
         """Return the (n, n) two-sided payoff; see `nonrigid.formulations.distortion.consistency`."""
-        excess = self.between[np.ix_(matches.part, matches.part)]
-        excess -= self.on_full[np.ix_(matches.full, matches.full)]
+        excess = between_all(self.between, matches.part)
+        excess -= between_all(self.on_full, matches.full)
         return payoff_of(excess, matches, kernel_width)
 
     def placed(self, rows: IntArray, images: IntArray, *, reach: float, descriptor_weight: float) -> IntArray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -17,7 +18,7 @@ from nonrigid.formulations.model.stiefel import Stiefel
 from nonrigid.formulations.model.terms.linear import Linear
 from nonrigid.formulations.trusted_descriptors import TrustedDescriptors
 from nonrigid.geometry.arrays import FloatArray, IntArray
-from nonrigid.geometry.maps import nearest_rows
+from nonrigid.geometry.maps import RowSearch, nearest_rows
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.points import SurfacePoints
 
@@ -66,21 +67,37 @@ class Bases:
         last = int(min(self.full.shape[1], self.part.shape[1] / self.share))
         return np.linspace(min(first / self.share, last), last, steps).round().astype(np.int64)
 
-    def features(
-        self, C: FloatArray, points: IntArray | slice, components: int | None = None
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return rows for points of the part and for the full surface's vertices, near where the two are the same.
-
-        `components`: how many of the descriptors' take part; all unless given.
+    def queries(self, C: FloatArray, points: IntArray | slice, components: int) -> FloatArray:
+        """Return rows for points of the part, near those of the full surface's `targets` where the two are the same.
 
         Near by, |phi(y) - phi(y')|^2 over k eigenfunctions is about pi k^2 |y - y'|^2 by Weyl's law (area 1): this is
         the scale at which descriptors stand beside them.
         """
-        size = len(C)
-        looks, others = self.looks[0][points, :components], self.looks[1][:, :components]
-        weight = np.pi * size**2 * self.descriptor_weight
-        queries = np.hstack([self.part[points, : C.shape[1]] @ C.T, weight * looks])
-        return queries, np.hstack([self.full[:, :size], others])
+        weight = np.pi * len(C) ** 2 * self.descriptor_weight
+        return np.hstack([weight * self.looks[0][points, :components], self.part[points, : C.shape[1]] @ C.T])
+
+    def targets(self, components: int) -> FloatArray:
+        """Return (n_full, .) rows: components of the descriptors, then eigenfunctions, of which maps use the first."""
+        return np.hstack([self.looks[1][:, :components], self.full])
+
+    def images(self, C: FloatArray, points: IntArray, grid: IntArray | None = None) -> IntArray:
+        """Return, for points of the part, the vertices of the full surface with the nearest features while maps grow.
+
+        `grid` are the vertices among which they are looked for: all unless given.
+        """
+        queries = self.queries(C, points, self.components)
+        columns = queries.shape[1]
+        if grid is None:
+            return self._anywhere.first(columns).nearest(queries)[0]
+        return grid[nearest_rows(queries, self._growing[grid, :columns])[0]]
+
+    @cached_property
+    def _growing(self) -> FloatArray:
+        return self.targets(self.components)
+
+    @cached_property
+    def _anywhere(self) -> RowSearch:
+        return RowSearch(self._growing)
 
     def likeness(self, points: IntArray, vertices: IntArray) -> FloatArray:
         """Return the (n,) trusted cosines of the descriptors of points of the part and vertices of the full surface."""
@@ -101,7 +118,9 @@ class Bases:
         -------
         The points, in the triangles around the (n,) vertices with the nearest features, and these.
         """
-        queries, features = self.features(C, slice(None))
+        components = self.looks[0].shape[1]
+        queries = self.queries(C, slice(None), components)
+        features = self.targets(components)[:, : queries.shape[1]]
         nearest = nearest_rows(queries, features)[0]
         if strays is not None:
             rows, around = strays(nearest)
@@ -232,7 +251,5 @@ def grown(
         rough = np.asarray(np.linalg.lstsq(part, basis.full[images, :size], rcond=None)[0].T, dtype=np.float64)
         solution = yield map_fit("map", rough)
         C = solution["C"]
-        queries, features = basis.features(C, points, basis.components)
-        coarse = number <= len(sizes) - FINE
-        images = grid[nearest_rows(queries, features[grid])[0]] if coarse else nearest_rows(queries, features)[0]
+        images = basis.images(C, points, grid if number <= len(sizes) - FINE else None)
     return C, images

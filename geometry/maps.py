@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from copy import copy
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
@@ -73,9 +76,9 @@ class RowSearch:
 
     Examples
     --------
-    >>> search = RowSearch(np.array([[0.0], [1.0], [2.0]]))
-    >>> search.nearest(np.array([[0.1]]))[0], search.nearest(np.array([[2.2]]))[0]
-    (array([0]), array([2]))
+    >>> search = RowSearch(np.array([[0.0, 9.0], [1.0, 0.0], [2.0, 0.0]]))
+    >>> search.nearest(np.array([[0.1, 0.0]]))[0], search.first(1).nearest(np.array([[0.1]]))[0]
+    (array([1]), array([0]))
     """
 
     def __init__(self, targets: FloatArray, *, dtype: DTypeLike = np.float32) -> None:
@@ -92,6 +95,24 @@ class RowSearch:
         self._half_norms = (0.5 * norms).astype(self._kind)
         self._reach = float(np.sqrt(norms.max(initial=0.0)))
         self._right_t = np.ascontiguousarray(right.T.astype(self._kind))
+
+    def first(self, columns: int) -> RowSearch:
+        """Return a search by the first `columns` coordinates alone; nothing is prepared again, and little is copied."""
+        if not 1 <= columns <= self._targets.shape[1]:
+            raise InputError(
+                f"first {columns} columns of {self._targets.shape[1]}", remedy="ask for at least 1, at most all"
+            )
+        fewer, norms = copy(self), self._running_norms[columns - 1]
+        fewer._targets, fewer._centre = self._targets[:, :columns], self._centre[:columns]
+        fewer._half_norms, fewer._right_t = (0.5 * norms).astype(self._kind), self._right_t[:columns]
+        fewer._reach = float(np.sqrt(norms.max(initial=0.0)))
+        return fewer
+
+    @cached_property
+    def _running_norms(self) -> FloatArray:
+        """(d, t) squared lengths of the centred targets by their first 1, 2, ..., d columns."""
+        right_t = np.ascontiguousarray(((self._targets - self._centre) * self._unit).T)
+        return np.asarray(np.cumsum(np.square(right_t, out=right_t), axis=0, out=right_t))
 
     def nearest(self, queries: FloatArray, *, count: int = 1, block: int = 512) -> tuple[IntArray, FloatArray]:
         """Return, for each query, the `count` nearest targets and their squared distances; see `nearest_rows`."""

@@ -77,14 +77,20 @@ def test_all_principal_components_measure_like_the_descriptors(creature: PairDat
         pair, descriptors, part_size=30, full_size=60, descriptor_weight=0.01, components=10, last_components=10**6
     )
     C, points = np.eye(40, 20), np.arange(0, len(pair.part.mesh.vertices), 7)
-    turned = basis.features(C, points)
+    turned = basis.queries(C, points, 10**6)
+    size = turned.shape[1] - len(C)
     weight = np.pi * len(C) ** 2 * basis.descriptor_weight
     whole = (
-        np.hstack([turned[0][:, :40], weight * descriptors.queries(points)]),
-        np.hstack([turned[1][:, :40], descriptors.targets()]),
+        np.hstack([weight * descriptors.queries(points), turned[:, size:]]),
+        np.hstack([descriptors.targets(), basis.full[:, : len(C)]]),
     )
-    np.testing.assert_array_equal(nearest_rows(*whole)[0], nearest_rows(*turned)[0])
-    assert basis.features(C, points, basis.components)[0].shape == (len(points), 40 + 10)
+    found = nearest_rows(turned, basis.targets(10**6)[:, : turned.shape[1]])[0]
+    np.testing.assert_array_equal(nearest_rows(*whole)[0], found)
+    fewer = basis.queries(C, points, basis.components)
+    assert fewer.shape == (len(points), 10 + 40)
+    grown = nearest_rows(fewer, basis.targets(basis.components)[:, : fewer.shape[1]])[0]
+    np.testing.assert_array_equal(basis.images(C, points), grown)
+    np.testing.assert_array_equal(basis.images(C, points, grown), grown)
 
 
 def test_every_vertex_of_a_creature_is_matched_well(creature: PairData, matched: Correspondence) -> None:

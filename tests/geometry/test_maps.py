@@ -31,6 +31,32 @@ def test_prepared_targets_answer_near_and_far_queries_alike(seed: int, count: in
         np.testing.assert_array_equal(squared.reshape(9, count), distances)
 
 
+@settings(max_examples=30, deadline=None)
+@given(
+    seed=st.integers(0, 10_000),
+    columns=st.integers(1, 6),
+    count=st.integers(1, 3),
+    uneven=st.sampled_from([1.0, 1e6]),
+    dtype=st.sampled_from([np.float32, np.float64]),
+)
+def test_a_search_by_the_first_columns_is_one_among_targets_cut_short(
+    seed: int, columns: int, count: int, uneven: float, dtype: type
+) -> None:
+    generator = np.random.default_rng(seed)
+    targets = generator.standard_normal((40, 6)) * np.where(np.arange(6) < 3, 1.0, uneven) + generator.standard_normal()
+    queries = generator.standard_normal((9, columns))
+    indices, squared = RowSearch(targets, dtype=dtype).first(columns).nearest(queries, count=count)
+    expected, distances = exhaustive(queries, targets[:, :columns], count)
+    np.testing.assert_array_equal(indices.reshape(9, count), expected)
+    np.testing.assert_array_equal(squared.reshape(9, count), distances)
+
+
+def test_no_search_by_more_columns_than_there_are() -> None:
+    for columns in (0, 4):
+        with pytest.raises(InputError, match=f"first {columns} columns of 3"):
+            RowSearch(np.zeros((2, 3))).first(columns)
+
+
 @settings(max_examples=60, deadline=None)
 @given(
     seed=st.integers(0, 10_000),
