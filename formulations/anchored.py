@@ -15,6 +15,7 @@ from nonrigid.formulations.games import game
 from nonrigid.formulations.judged_maps import KEEPING, Ground, Grown
 from nonrigid.formulations.local_rigidity import moved_together
 from nonrigid.formulations.model import ElasticNet, Problem
+from nonrigid.formulations.orientation import Orientation
 from nonrigid.formulations.sampled_distances import SampledDistances, sampled_distances
 from nonrigid.formulations.spectral_growth import bases, grown
 from nonrigid.formulations.trusted_descriptors import trusted_descriptors
@@ -26,6 +27,10 @@ _GAIN = 0.002
 
 _HELD = 0.02
 """Mean confidence that a map has to gain on a leash: it is held to images that keep distances, wrong ones as well."""
+
+
+_SETTLED = 0.005
+"""Share of the samples in patches that are turned over, up to which a map need not be fitted once more."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,8 +74,9 @@ class Anchored:
     2. Distances to the anchors place every sample of the part. Those whose distances to their neighbours agree best
        become the next anchors, nearer ones; and again.
     3. "map": a functional map with orthonormal columns is fitted to the samples and better images are read off it, with
-       ever more eigenfunctions. Where its mean confidence is low, as on parts torn by many holes, it also grows on a
-       leash: before each fit, images far from where the surest ones place them are put there.
+       ever more eigenfunctions. Before each fit, patches that are laid down as their own mirror images, such as an arm
+       whose front and back are exchanged, are turned back. Where its mean confidence is low, as on parts torn by many
+       holes, it also grows on a leash: images far from where the surest ones place them are put there.
     4. Several starts are tried, which differ in the game and in whether ways on the part may cross what was cut out.
        Of two maps the better one has the higher mean confidence, with the likeness of descriptors counted in.
     5. Where the mean confidence of the best map stays low, its best images become anchors in their turn, and steps 2
@@ -118,6 +124,9 @@ class Anchored:
     leash, straying
         How far an image may lie from where the surest samples' distances place it, in units of sqrt(full area): while
         a map grows on a leash, and in the end.
+    oriented
+        Whether patches that a growing map turns over are turned back; see
+        `nonrigid.formulations.orientation.Orientation`.
     part_size, full_size
         Largest numbers of eigenfunctions.
     rigid_rounds, rigid_reach, rigid_tolerance
@@ -159,6 +168,7 @@ class Anchored:
     unsure: float = 0.8
     leash: float = 0.04
     straying: float = 0.1
+    oriented: bool = True
     part_size: int = 100
     full_size: int = 200
     rigid_rounds: int = 2
@@ -196,7 +206,8 @@ class Anchored:
             components=self.components,
             last_components=self.last_components,
         )
-        ground = Ground(pair, basis, along, along.measured(pair, "bridged") if self.bridged else along)
+        bridged = along.measured(pair, "bridged") if self.bridged else along
+        ground = Ground(pair, basis, along, bridged, Orientation.of(pair, along.points))
         nothing = np.empty(0, dtype=np.int64)
         best = Grown(-1.0, -np.inf, np.empty((0, 0)), nothing, nothing)
         for start in STARTS[: self.starts]:
@@ -304,13 +315,19 @@ class Anchored:
             reach=self.local_reach,
             descriptor_weight=self.placing_weight,
         )
+
+        def corrected(images: IntArray) -> IntArray:
+            images = held(images) if leash < np.inf else images
+            return ground.orientation.turned_back(images) if self.oriented else images
+
         C, images = yield from grown(
             ground.basis,
             samples.points,
             samples.grid[rows],
             ground.basis.sizes(self.first_size, steps),
             grid=samples.grid,
-            corrected=held if leash < np.inf else None,
+            corrected=corrected,
+            unsettled=lambda images: self.oriented and float(ground.orientation.turned_over(images).mean()) > _SETTLED,
         )
         far, around = self._strays(ground, samples.points, images)
         images[far] = around

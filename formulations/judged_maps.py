@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nonrigid.formulations.formulation import Pair
+from nonrigid.formulations.orientation import Orientation
 from nonrigid.formulations.sampled_distances import SampledDistances
 from nonrigid.formulations.spectral_growth import Bases
 from nonrigid.geometry.arrays import FloatArray, IntArray
@@ -33,6 +34,8 @@ class Ground:
         What is matched, and the eigenfunctions and descriptors of both surfaces.
     along, bridged
         The same samples, with distances on the part along it, and across what was cut out.
+    orientation
+        That of the samples.
 
     Source: this package.
     """
@@ -41,6 +44,7 @@ class Ground:
     basis: Bases
     along: SampledDistances
     bridged: SampledDistances
+    orientation: Orientation
 
     def confidence(self, vertices: IntArray, nearest: IntArray) -> FloatArray:
         """Return (n,) how well a map keeps distances, 0 to 1, the mean of both ways.
@@ -56,7 +60,7 @@ class Ground:
         return np.asarray(0.5 * (along + bridged))
 
     def judged(self, C: FloatArray, rows: IntArray, images: IntArray) -> Grown:
-        """Return a map with how good it is.
+        """Return a map with how good it is; samples in patches that it turns over have no confidence.
 
         Parameters
         ----------
@@ -65,7 +69,8 @@ class Ground:
         rows, images
             (p,) each, for the samples: rows of the grid that it grew from, and vertices that were read off it.
         """
-        score = float(self.confidence(self.bridged.points, images).mean())
+        confidence = self.confidence(self.bridged.points, images)
+        score = float(np.mean(confidence * ~self.orientation.turned_over(images)))
         likeness = float(self.basis.likeness(self.bridged.points, images).mean())
         return Grown(score, score + _LIKENESS * likeness, C, rows, images)
 

@@ -215,6 +215,10 @@ FINE = 5
 the time; with 3, one of six parts tried lost the end of a limb."""
 
 
+AGAIN = 3
+"""How often, at most, the last map is fitted again: with all its eigenfunctions, small patches turn round at last."""
+
+
 def grown(
     basis: Bases,
     points: IntArray,
@@ -223,6 +227,7 @@ def grown(
     *,
     grid: IntArray,
     corrected: Callable[[IntArray], IntArray] | None = None,
+    unsettled: Callable[[IntArray], bool] | None = None,
 ) -> Generator[Problem, Solved, tuple[FloatArray, IntArray]]:
     """Fit a functional map to matches and read better matches off it, with ever more eigenfunctions.
 
@@ -236,6 +241,8 @@ def grown(
         Vertices of the full surface, spread evenly, among which images are looked for at first.
     corrected
         Makes better images of those read off a map, before the next is fitted to them.
+    unsettled
+        While it says so of the images read off the last map, that is fitted again, at most `AGAIN` times.
 
     Returns
     -------
@@ -244,7 +251,9 @@ def grown(
     Source: Melzi, Ren, Rodola, Sharma, Wonka and Ovsjanikov, ZoomOut (SIGGRAPH Asia 2019), here from part to whole,
     with orthonormal maps and with descriptors beside the eigenfunctions.
     """
-    for number, size in enumerate(sizes, start=1):
+    for number, size in enumerate(np.append(sizes, np.full(AGAIN, sizes[-1])), start=1):
+        if number > len(sizes) and (unsettled is None or not unsettled(images)):
+            break
         if corrected is not None and number > 1:
             images = corrected(images)
         part = basis.part[points, : basis.part_size(int(size))]

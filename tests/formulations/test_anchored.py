@@ -17,6 +17,7 @@ from nonrigid.formulations.anchored import LAST_STARTS, STARTS, Anchored
 from nonrigid.formulations.formulation import Correspondence, Pair
 from nonrigid.formulations.interpolation import closest_feature_points
 from nonrigid.formulations.judged_maps import KEEPING, Ground
+from nonrigid.formulations.orientation import Orientation
 from nonrigid.formulations.sampled_distances import sampled_distances
 from nonrigid.formulations.spectral_growth import bases, map_fit
 from nonrigid.formulations.trusted_descriptors import trusted_descriptors
@@ -126,7 +127,9 @@ def test_images_that_move_together_are_nearer_the_truth(creature: PairData, matc
 
 def test_a_map_that_stays_unsure_is_started_in_every_way(creature: PairData) -> None:
     part = random_rigid_motion(creature.part)[0]
-    hopeless = replace(SMALL, starts=len(STARTS), enough=2.0, unsure=2.0, repeats=1, steps=2, last_steps=0)
+    hopeless = replace(
+        SMALL, oriented=False, starts=len(STARTS), enough=2.0, unsure=2.0, repeats=1, steps=2, last_steps=0
+    )
     named = [solution.problem for solution in match(Pair.of(part, creature.full), hopeless).solutions]
     groups = [len(list(run)) for name, run in groupby(named) if name == "game"]
     assert len(groups) == len(STARTS) + len(LAST_STARTS)
@@ -141,7 +144,7 @@ def test_a_map_that_stays_unsure_is_started_in_every_way(creature: PairData) -> 
 
 def test_a_map_that_stays_unsure_also_grows_on_a_leash(creature: PairData) -> None:
     pair = Pair.of(random_rigid_motion(creature.part)[0], creature.full)
-    few = replace(SMALL, starts=1, enough=0.0, repeats=1, steps=2, last_steps=3)
+    few = replace(SMALL, oriented=False, starts=1, enough=0.0, repeats=1, steps=2, last_steps=3)
     counts = {
         unsure: [solution.problem for solution in match(pair, replace(few, unsure=unsure)).solutions].count("map")
         for unsure in (0.0, 2.0)
@@ -161,7 +164,7 @@ def test_ways_across_what_was_cut_out_are_never_longer_and_count_half(creature: 
     basis = bases(
         pair, descriptors, part_size=30, full_size=60, descriptor_weight=0.01, components=9, last_components=9
     )
-    ground = Ground(pair, basis, along, bridged)
+    ground = Ground(pair, basis, along, bridged, Orientation.of(pair, along.points))
     images = pair.full.samples(len(along.points))
     each = [way.confidence(pair, along.points, images, width=KEEPING) for way in (along, bridged)]
     assert np.allclose(ground.confidence(along.points, images), np.mean(each, axis=0))
