@@ -74,7 +74,8 @@ class Orientation:
         ranks = np.arange(2, min(NEIGHBOURS + 1, len(points)) + 1)
         gap, near = (np.asarray(found) for found in cKDTree(places).query(places, k=ranks))
         facing = np.maximum(np.einsum("nkx,nx->nk", normals[near], normals), 0.0)
-        weight = facing * np.exp(-np.square(gap / np.maximum(gap[:, -1:], 1e-300)))
+        # The farthest counts nothing: it may be one of several equally far, of which others were left out.
+        weight = facing * (1.0 - np.square(gap / np.maximum(gap[:, -1:], 1e-300)))
         on_part = _tangent(places[near] - places[:, None], normals)
         return cls(places, normals, near, weight, on_part, full.vertices, full.vertex_normals)
 
