@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import dijkstra
 from scipy.spatial.transform import Rotation
 
 from nonrigid.benchmark.datasets.protocols import PairData
-from nonrigid.benchmark.metric import geodesic_errors
+from nonrigid.benchmark.metric import errors_of_both
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.geodesics import virtual_edge_graph
@@ -41,7 +41,8 @@ class Score:
     rows
         (p,) the vertices of the part that have a match and a known truth.
     direct, mirrored
-        (p,) errors of these against the truth and against its mirror image (None where there is none).
+        (p,) errors of these against the truth and against its mirror image (None where there is none). On the side with
+        the greater mean, those that exceed the other's at the same point may be inf; see `errors_of_both`.
     side
         Which of the two has the smaller mean over the whole shape: "direct" or "mirrored".
     mean_error
@@ -113,10 +114,8 @@ def score(pair: PairData, points: SurfacePoints, *, geodesics: str = "dijkstra")
     rows = np.flatnonzero(points.matched & pair.truth.matched)
     if points.matched.any() and not len(rows):
         raise InputError(f"no matched vertex of {pair.name} has ground truth", remedy="match vertices that have it")
-    direct = geodesic_errors(pair.full, points[rows], pair.truth[rows], geodesics=geodesics)
-    mirrored = None
-    if pair.mirrored is not None:
-        mirrored = geodesic_errors(pair.full, points[rows], pair.mirrored[rows], geodesics=geodesics)
+    image = None if pair.mirrored is None else pair.mirrored[rows]
+    direct, mirrored = errors_of_both(pair.full, points[rows], pair.truth[rows], image, geodesics=geodesics)
     if np.isnan(direct).any() or (mirrored is not None and np.isnan(mirrored).any()):
         raise InputError(
             f"a matched vertex of {pair.name} has ground truth on one side only", remedy="complete the ground truth"

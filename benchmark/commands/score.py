@@ -12,7 +12,7 @@ import typer
 from nonrigid.benchmark.commands.summary import show_summary
 from nonrigid.benchmark.datasets.protocols import PairData
 from nonrigid.benchmark.formats import read_truth
-from nonrigid.benchmark.metric import geodesic_errors
+from nonrigid.benchmark.metric import errors_of_both
 from nonrigid.benchmark.protocol import curve, score
 from nonrigid.benchmark.report.table import summary
 from nonrigid.benchmark.score_predictions import score_predictions
@@ -139,10 +139,9 @@ def _errors(
 ) -> tuple[np.ndarray, float, str]:
     """Return the errors on the better side, the mean of the lesser error at each point, and the side."""
     rows = np.flatnonzero(points.matched)
-    direct = geodesic_errors(full, points[rows], truth[rows], geodesics=metric)
-    sides = [direct]
-    if mirrored is not None:
-        sides.append(geodesic_errors(full, points[rows], mirrored[rows], geodesics=metric))
+    image = None if mirrored is None else mirrored[rows]
+    both = errors_of_both(full, points[rows], truth[rows], image, geodesics=metric)
+    sides = [errors for errors in both if errors is not None]
     if np.isnan(sides).any():
         raise InputError("a matched vertex has no ground truth", remedy="leave it unmatched")
     better = int(np.argmin([_mean(errors) for errors in sides])) if len(rows) else 0

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from nonrigid.benchmark.aggregate import by_partiality, summarize
 from nonrigid.benchmark.datasets.protocols import PairData
-from nonrigid.benchmark.metric import geodesic_errors, point_distances
+from nonrigid.benchmark.metric import errors_of_both, geodesic_errors, point_distances
 from nonrigid.benchmark.protocol import Score, coverage, curve, random_rigid_motion, score
 from nonrigid.benchmark.vertex_pairs import METRICS, vertex_pair_distances
 from nonrigid.geometry.errors import InputError, UnknownNameError
@@ -153,6 +153,26 @@ def test_a_map_that_mixes_sides_is_penalised_in_the_primary_score_only() -> None
     assert result.mean_error_per_point == pytest.approx(0.0, abs=1e-9)
     assert result.mirrored is not None
     assert result.errors.mean() == result.mean_error <= result.mirrored.mean()
+
+
+@given(seed=st.integers(0, 1000), share=st.floats(0.0, 1.0), shift=st.sampled_from([0.0, 0.3, 4.0]))
+@settings(max_examples=20, deadline=None)
+def test_what_is_left_unmeasured_changes_no_score(seed: int, share: float, shift: float) -> None:
+    generator = np.random.default_rng(seed)
+    moved = mixed(generator.random(len(TRUTH)) < share).positions(PAIR.full)
+    points = closest_points(PAIR.full, moved + shift * generator.standard_normal(moved.shape))
+    sides = [geodesic_errors(PAIR.full, points, side) for side in (TRUTH, MIRRORED)]
+    quick = errors_of_both(PAIR.full, points, TRUTH, MIRRORED)
+    assert quick[1] is not None
+    np.testing.assert_array_equal(np.minimum(*quick), np.minimum(*sides))
+    better = int(np.mean(sides[1]) < np.mean(sides[0]))
+    np.testing.assert_array_equal(quick[better], sides[better])
+    assert not quick[1 - better].mean() < sides[better].mean()
+    exceeding = np.isinf(quick[1 - better])
+    assert (sides[1 - better] >= sides[better])[exceeding].all()
+    result = score(PAIR, points)
+    assert result.mean_error == pytest.approx(np.mean(sides[better]), abs=1e-12)
+    assert result.mean_error_per_point == pytest.approx(np.minimum(*sides).mean(), abs=1e-12)
 
 
 def test_unmatched_vertices_are_left_out_and_counted() -> None:
