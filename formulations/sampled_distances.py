@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -143,10 +144,18 @@ class SampledDistances:
     def _changes(self, pair: Pair, vertices: IntArray, nearest: IntArray) -> FloatArray:
         """Return the mean |d - D| of vertices to the first s samples, near ones counting most: a length."""
         rows = self.on_grid(pair, nearest)
-        on_part = pair.part.distances(self.points[: len(self.on_part)], self.geodesics)[:, vertices]
-        weight = np.exp(-np.square(on_part / NEAR))
-        off = np.abs(on_part - self.on_full[np.ix_(rows[self._first(pair, vertices)], rows)])
-        return np.asarray((weight * off).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-300))
+        if np.array_equal(vertices, self.points):
+            on_part, weight, total = self.on_part, *self._nearness
+        else:
+            on_part = pair.part.distances(self.points[: len(self.on_part)], self.geodesics)[:, vertices]
+            weight, total = _nearness(on_part)
+        off = self.on_full[rows[self._first(pair, vertices)]].take(rows, axis=1)
+        off -= on_part
+        return np.asarray(np.einsum("sv,sv->v", weight, np.abs(off, out=off)) / total)
+
+    @cached_property
+    def _nearness(self) -> tuple[FloatArray, FloatArray]:
+        return _nearness(self.on_part)
 
     def _first(self, pair: Pair, vertices: IntArray) -> IntArray:
         """Return where the first s samples stand among vertices of the part."""
@@ -226,6 +235,12 @@ class SampledDistances:
         """Return which of the first s samples agree best with their neighbours, a given share of them."""
         off = self.disagreement(images)
         return np.flatnonzero(off <= np.quantile(off, share))
+
+
+def _nearness(distances: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return how much near ones of (s, v) distances count more than far ones, and the (v,) sums."""
+    weight = np.exp(-np.square(distances / NEAR))
+    return weight, np.maximum(weight.sum(axis=0), 1e-300)
 
 
 def sampled_distances(

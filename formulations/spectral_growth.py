@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import lstsq
 from scipy.spatial import cKDTree
 
 from nonrigid.formulations.candidates import principal_axes
@@ -257,7 +258,7 @@ def grown(
         if corrected is not None and number > 1:
             images = corrected(images)
         part = basis.part[points, : basis.part_size(int(size))]
-        rough = np.asarray(np.linalg.lstsq(part, basis.full[images, :size], rcond=None)[0].T, dtype=np.float64)
+        rough = np.asarray(lstsq(part, basis.full[images, :size], lapack_driver="gelsy")[0].T, dtype=np.float64)
         solution = yield map_fit("map", rough)
         C = solution["C"]
         images = basis.images(C, points, grid if number <= len(sizes) - FINE else None)
