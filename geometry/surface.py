@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,6 +25,8 @@ LARGEST_STORED = 64_000_000
 """Bytes: larger distance matrices are computed again instead of being kept."""
 
 Made = TypeVar("Made")
+Answers: TypeAlias = list[tuple[IntArray, FloatArray]]
+"""Distances that are known: ascending vertices, and a row of each."""
 
 
 class Surface:
@@ -61,7 +63,8 @@ class Surface:
         self.raw = mesh
         self._cache = default_cache() if cache == "default" else Cache(None) if cache is None else cache
         self._made: dict[str, Any] = {}
-        self._squares: dict[str, list[tuple[IntArray, FloatArray]]] = {}
+        self._rows: dict[str, Answers] = {}
+        self._squares: dict[str, Answers] = {}
 
     def __repr__(self) -> str:
         return f"Surface({self.raw.name}: {len(self.raw.vertices)} vertices, {len(self.raw.faces)} faces)"
@@ -143,10 +146,14 @@ class Surface:
         """Return the (s, n) distances along the surface from `sources` to every vertex, in the unit of the vertices.
 
         `method` is "dijkstra", "bridged", "heat" or "exact"; see `nonrigid.geometry.geodesics`. Answers larger than
-        `LARGEST_STORED` are not kept.
+        `LARGEST_STORED` are not kept; what an earlier answer for more sources holds is taken from there.
         """
         wanted, method = np.asarray(sources, dtype=np.int64).reshape(-1), self._same_as(method)
         ascending, place = np.unique(wanted, return_inverse=True)
+        answers = self._rows.setdefault(method, [])
+        if (earlier := _holding(ascending, answers)) is not None:
+            known, larger = earlier
+            return larger if np.array_equal(wanted, known) else larger[np.searchsorted(known, wanted)]
         key = ("distances", method, ascending)
 
         def fresh() -> dict[str, FloatArray]:
@@ -155,7 +162,8 @@ class Surface:
         if ascending.size * len(self.mesh.vertices) * 8 > LARGEST_STORED:
             large: FloatArray = _frozen(fresh()["rows"][place])
             return large
-        rows: FloatArray = self._remember(content_hash(*key), lambda: self._stored(key, fresh)["rows"])
+        rows: FloatArray = self._stored(key, fresh)["rows"]
+        answers.append((ascending, rows))
         return rows if np.array_equal(wanted, ascending) else rows[place]
 
     def distances_between(self, vertices: ArrayLike, method: str = "dijkstra", *, keep: bool = True) -> FloatArray:
@@ -168,10 +176,13 @@ class Surface:
         wanted, method = np.asarray(vertices, dtype=np.int64).reshape(-1), self._same_as(method)
         ascending, place = np.unique(wanted, return_inverse=True)
         squares = self._squares.setdefault(method, [])
-        for known, larger in squares:
-            if np.isin(ascending, known, assume_unique=True).all():
-                rows = np.searchsorted(known, wanted)
-                return larger if np.array_equal(wanted, known) else larger[np.ix_(rows, rows)]
+        if (earlier := _holding(ascending, squares)) is not None:
+            known, larger = earlier
+            rows = np.searchsorted(known, wanted)
+            return larger if np.array_equal(wanted, known) else larger[np.ix_(rows, rows)]
+        if (earlier := _holding(ascending, self._rows.get(method, []))) is not None:
+            known, larger = earlier
+            return larger[np.searchsorted(known, wanted)].take(wanted, axis=1)
         key = ("between", method, ascending)
 
         def fresh() -> dict[str, FloatArray]:
@@ -202,6 +213,11 @@ class Surface:
 
     def _stored(self, key: tuple[object, ...], compute: Callable[[], dict[str, Any]]) -> dict[str, Any]:
         return {name: _frozen(array) for name, array in self._cache.fetch((self.key, *key), compute).items()}
+
+
+def _holding(ascending: IntArray, answers: Answers) -> tuple[IntArray, FloatArray] | None:
+    """Return the first of earlier answers that is known for all the given vertices, if there is one."""
+    return next((one for one in answers if np.isin(ascending, one[0], assume_unique=True).all()), None)
 
 
 def _frozen(array: Any) -> Any:

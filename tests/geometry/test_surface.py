@@ -74,6 +74,19 @@ def test_distances_between_some_of_the_vertices_of_an_earlier_answer_are_taken_f
     assert cache.info().entries == 2
 
 
+@pytest.mark.parametrize("method", ["dijkstra", "heat"])
+def test_distances_from_some_of_the_sources_of_an_earlier_answer_are_taken_from_it(tmp_path: Path, method: str) -> None:
+    surface, cache = Surface(bumpy(), cache=Cache(tmp_path)), Cache(tmp_path)
+    surface.distances([9, 4, 30, 2], method)
+    for some in ([30, 4], [2, 9, 2], [2, 4, 9, 30]):
+        alone = Surface(bumpy(), cache=None)
+        assert surface.distances(some, method).tobytes() == alone.distances(some, method).tobytes()
+        assert surface.distances_between(some, method).tobytes() == alone.distances_between(some, method).tobytes()
+    assert cache.info().entries == 1
+    surface.distances([9, 5], method)
+    assert cache.info().entries == 2
+
+
 def test_large_distance_matrices_are_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     surface = Surface(bumpy(), cache=Cache(tmp_path))
     kept = surface.distances([3, 1])
