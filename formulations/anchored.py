@@ -62,8 +62,8 @@ LAST_STARTS = (
     Start(kernel_width=2 / 3, mix=0.6),
     Start(kernel_width=5 / 3, mix=1.6, bridged=False),
 )
-"""Starts that are tried while these leave the best map unsure: many anchors, and few. They come last, because on thin
-strips many anchors may slide along the strip and agree all the better."""
+"""Starts that are tried where these do not suffice: many anchors, and few. They come last, because on thin strips many
+anchors may slide along the strip and agree all the better."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,11 +116,12 @@ class Anchored:
         Whether starts may measure ways on the part across what was cut out; see
         `nonrigid.geometry.geodesics.BridgedGeodesics`.
     starts, enough
-        Largest number of starts, and the mean confidence at which no other is tried.
+        Largest number of starts, of `STARTS` and then of `LAST_STARTS`, and the mean confidence at which no other is
+        tried.
     repeats
         How often, at most, the images of a map that is not sure enough become anchors again.
     unsure
-        Mean confidence below which `LAST_STARTS` are tried too, and maps grow on a leash.
+        Mean confidence below which maps grow on a leash, too.
     leash, straying
         How far an image may lie from where the surest samples' distances place it, in units of sqrt(full area): while
         a map grows on a leash, and in the end.
@@ -162,7 +163,7 @@ class Anchored:
     components: int = 80
     last_components: int = 200
     bridged: bool = True
-    starts: int = 3
+    starts: int = 6
     enough: float = 0.85
     repeats: int = 3
     unsure: float = 0.8
@@ -181,7 +182,7 @@ class Anchored:
     def stages(self, pair: Pair) -> Stages:
         """State the game, then one map a step; return one point a vertex of the part."""
         bounds = (
-            ("steps", 1, 1000), ("last_steps", 0, 1000), ("repeats", 0, 1000), ("starts", 1, len(STARTS)),
+            ("steps", 1, 1000), ("last_steps", 0, 1000), ("repeats", 0, 1000), ("starts", 1, len(STARTS + LAST_STARTS)),
             ("leash", 0, np.inf), ("straying", 0, np.inf),
             ("rigid_rounds", 0, 1000), ("rigid_reach", 1e-6, np.inf), ("rigid_tolerance", 1e-6, np.inf),
         )  # fmt: skip
@@ -216,8 +217,8 @@ class Anchored:
             if best.score >= self.enough:
                 break
         best = yield from self._repeated(ground, best)
-        for start in LAST_STARTS:
-            if best.score >= self.unsure:
+        for start in LAST_STARTS[: max(0, self.starts - len(STARTS))]:
+            if best.score >= self.enough:
                 break
             rows = yield from self._anchored(ground, start)
             other = yield from self._tried(ground, rows)
