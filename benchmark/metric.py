@@ -42,7 +42,7 @@ def errors_of_both(
     >>> square = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
     >>> corners = SurfacePoints.at_vertices(square, [0, 1])
     >>> errors_of_both(square, corners, corners, SurfacePoints.at_vertices(square, [1, 0]))
-    (array([0., 0.]), array([inf, inf]))
+    (array([0., 0.]), array([1., 1.]))
     """
     if mirrored is None:
         return geodesic_errors(full, matched, truth, geodesics=geodesics), None
