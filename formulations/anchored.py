@@ -23,11 +23,10 @@ from nonrigid.geometry.arrays import IntArray
 from nonrigid.geometry.errors import InputError
 
 _GAIN = 0.002
-"""Mean confidence that a map has to gain when it grows again, for another time to be worth it."""
+"""Worth that a map has to gain when it grows again, for another time to be worth its while; see `Grown`."""
 
 _HELD = 0.02
-"""Mean confidence that a map has to gain on a leash: it is held to images that keep distances, wrong ones as well."""
-
+"""Worth that a map has to gain on a leash: it is held to images that keep distances, wrong ones as well."""
 
 _SETTLED = 0.005
 """Share of the samples in patches that are turned over, up to which a map need not be fitted once more."""

@@ -54,6 +54,18 @@ class Orientation:
     vertices, outward
         (m, 3) of the full surface: vertices, in the same unit, and unit normals.
 
+    Examples
+    --------
+    >>> import trimesh
+    >>> from nonrigid.geometry.mesh import Mesh
+    >>> ball = trimesh.creation.icosphere(subdivisions=3)
+    >>> limb = Mesh(ball.vertices * [5, 1, 0.8], ball.faces)
+    >>> found = Orientation.of(Pair.of(limb, limb), np.arange(642))
+    >>> mirrored = cKDTree(limb.vertices).query(limb.vertices * [1, -1, 1])[1]
+    >>> patch = np.where(np.abs(limb.vertices[:, 0]) < 2.5, mirrored, np.arange(642))
+    >>> [float(found.turned_over(images).mean().round(1)) for images in (mirrored, patch, found.turned_back(patch))]
+    [0.0, 0.5, 0.0]
+
     Source: this package. How to ask functional maps to keep orientation: Ren, Poulenard, Wonka, Ovsjanikov, "Continuous
     and orientation-preserving correspondences via functional maps", SIGGRAPH Asia 2018.
     """
@@ -83,7 +95,7 @@ class Orientation:
         """Return (n,) the sense in which each point's surroundings are laid down, 1 to -1: positive with most of them.
 
         With u and v the neighbours' complex coordinates in the two tangent planes, a patch that is only turned about
-        has a large |sum conj(u) v|, and one that is turned over, too, a large |sum u v|. The sense is the difference of
+        has a large |sum conj(u) v|, and one that is turned over has a large |sum u v|. The sense is the difference of
         the two over the largest that either can be, averaged with the neighbours'.
 
         Parameters
