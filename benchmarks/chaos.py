@@ -61,6 +61,7 @@ class Stage:
         command = [sys.executable, "-c", code, "bench", str(self.plan), "--out", str(out), "--quiet", "--json", *words]
 
         def confine() -> None:
+            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # to write a core may take longer than a run
             if limit is not None:
                 resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
@@ -220,7 +221,16 @@ def compare(stage: Stage, name: str, out: Path, truth: dict[str, list[object]], 
     found = results(out)
     differing = [run for run in truth if found.get(run) != truth[run]]
     good = not differing and len(found) == len(truth) == total
-    stage.say(f"results of {name}", f"{len(found)} of {total} runs, {len(differing)} differ from the undisturbed", good)
+    seen = f"{len(found)} of {total} runs, {len(differing)} differ from the undisturbed"
+    for run in differing:
+        mine = found.get(run, [None] * len(COMPARED))
+        other = [
+            f"{key} {a} for {b}"
+            for key, a, b in zip(COMPARED, mine, truth[run], strict=True)
+            if a != b and key != "curve"
+        ]
+        seen += f"; {run}: {', '.join(other)}"
+    stage.say(f"results of {name}", seen, good)
 
 
 def count_statuses(out: Path) -> str:

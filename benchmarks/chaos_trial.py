@@ -64,7 +64,7 @@ class Trial:
 PLAN = """
 title = "Chaos"
 backends = ["native"]
-run_seconds = {run_seconds}
+run_seconds = 8
 [data]
 dataset = "shrec16"
 root = "data"
@@ -86,7 +86,7 @@ def write_trial(folder: Path, rng: random.Random, *, small: bool) -> int:
     good = 6 if small else 52
     kinds = ["good"] * good + ["crash", "hang", "memory", "fat"]
     rng.shuffle(kinds)
-    text = PLAN.format(run_seconds=3 if small else 8, splits='["cuts"]' if small else '["cuts", "holes"]')
+    text = PLAN.format(splits='["cuts"]' if small else '["cuts", "holes"]')
     for number, kind in enumerate(kinds):
         settings = f'{{ number = {number}, kind = "{kind}" }}'
         text += f'[[methods]]\nmethod = "trial"\nlabel = "{kind}-{number}"\nsettings = {settings}\n'
