@@ -75,14 +75,18 @@ def _by_dijkstra(mesh: Mesh, a: IntArray, b: IntArray, up_to: FloatArray) -> Flo
     graph = virtual_edge_graph(mesh)
     found = np.full(len(a), np.inf)
     reached, near = -np.inf, _NEAR * np.sqrt(mesh.area)
-    for limit in (near, float(up_to.max(initial=near))):
-        left = np.flatnonzero(np.isinf(found) & (up_to > reached))
+    for most in (np.minimum(up_to, near), up_to):
+        left = np.flatnonzero(np.isinf(found) & (most > reached))
         sources, row = np.unique(a[left], return_inverse=True)
+        need = np.full(len(sources), -np.inf)
+        np.maximum.at(need, row, most[left])
+        order = np.argsort(need, kind="stable")  # sources that need go equally far share a block
+        place = np.argsort(order)[row]
         for start in range(0, len(sources), _BLOCK):
-            mine = np.flatnonzero((row >= start) & (row < start + _BLOCK))
-            rows = dijkstra(graph, directed=True, indices=sources[start : start + _BLOCK], limit=limit)
-            found[left[mine]] = rows[row[mine] - start, b[left[mine]]]
-        reached = limit
+            block, mine = order[start : start + _BLOCK], np.flatnonzero((place >= start) & (place < start + _BLOCK))
+            rows = dijkstra(graph, directed=True, indices=sources[block], limit=float(need[block[-1]]))
+            found[left[mine]] = rows[place[mine] - start, b[left[mine]]]
+        reached = near
     return found
 
 
