@@ -48,7 +48,13 @@ class GameSettings:
 
 
 def players(settings: GameSettings, pair: Pair) -> Candidates:
-    """Return the candidates of the first game."""
+    """Return the candidates of the first game, with the distances between all samples of the full surface known.
+
+    Those depend on no part: in the cache, they serve every part of that surface.
+    """
+    pair.full.distances_between(
+        pair.full.samples(min(settings.full_samples, len(pair.full.mesh.vertices))), settings.geodesics
+    )
     return candidate_matches(
         pair,
         part_samples=settings.part_samples,

@@ -113,7 +113,7 @@ class SampledDistances:
 
         The place of x is the y with the least `placing_cost` + descriptor_weight * unlike(x, y).
         """
-        cost = placing_cost(on_part, on_full, reach=reach) + descriptor_weight * self.unlike
+        cost = placing_cost(on_part, on_full, reach=reach, dtype=np.float32) + descriptor_weight * self.unlike
         return np.asarray(cost.argmin(axis=1), dtype=np.int64)
 
     def on_grid(self, pair: Pair, vertices: IntArray) -> IntArray:
@@ -225,8 +225,8 @@ class SampledDistances:
         around = np.empty(len(unsure), dtype=np.int64)
         for start in range(0, len(unsure), _BLOCK):
             block = slice(start, start + _BLOCK)
-            place = placing_cost(on_part[:, vertices[unsure[block]]], on_full, reach=reach).argmin(axis=1)
-            around[block] = self.grid[place]
+            near = on_part[:, vertices[unsure[block]]]
+            around[block] = self.grid[placing_cost(near, on_full, reach=reach, dtype=np.float32).argmin(axis=1)]
         where = pair.full.mesh.vertices
         far = np.linalg.norm(where[nearest[unsure]] - where[around], axis=1) > length
         return unsure[far], around[far]
