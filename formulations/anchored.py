@@ -76,8 +76,9 @@ class Anchored:
        ever more eigenfunctions. Before each fit, patches that are laid down as their own mirror images, such as an arm
        whose front and back are exchanged, are turned back. Where its mean confidence is low, as on parts torn by many
        holes, it also grows on a leash: images far from where the surest ones place them are put there.
-    4. Several starts are tried, which differ in the game and in whether ways on the part may cross what was cut out.
-       Of two maps the better one has the higher mean confidence, with the likeness of descriptors counted in.
+    4. Several starts are tried, which differ in the game and in whether ways on the part may cross what was cut out,
+       until a map is sure or two starts have led to the same one. Of two maps the better one has the higher mean
+       confidence, with the likeness of descriptors counted in.
     5. Where the mean confidence of the best map stays low, its best images become anchors in their turn, and steps 2
        and 3 are done again while that makes it better.
     6. The last map reads off every vertex, images that stray looked for again near where the surest ones place them,
@@ -114,9 +115,10 @@ class Anchored:
     bridged
         Whether starts may measure ways on the part across what was cut out; see
         `nonrigid.geometry.geodesics.BridgedGeodesics`.
-    starts, enough
-        Largest number of starts, of `STARTS` and then of `LAST_STARTS`, and the mean confidence at which no other is
-        tried.
+    starts, enough, agreement
+        Largest number of starts, of `STARTS` and then of `LAST_STARTS`; no other is tried once the best map has a mean
+        confidence of `enough`, or a share `agreement` of its samples lie where another start's map puts them as well:
+        starts that go wrong rarely do so in the same way.
     repeats
         How often, at most, the images of a map that is not sure enough become anchors again.
     unsure
@@ -164,6 +166,7 @@ class Anchored:
     bridged: bool = True
     starts: int = 6
     enough: float = 0.85
+    agreement: float = 0.95
     repeats: int = 3
     unsure: float = 0.8
     leash: float = 0.04
@@ -182,7 +185,7 @@ class Anchored:
         """State the game, then one map a step; return one point a vertex of the part."""
         bounds = (
             ("steps", 1, 1000), ("last_steps", 0, 1000), ("repeats", 0, 1000), ("starts", 1, len(STARTS + LAST_STARTS)),
-            ("leash", 0, np.inf), ("straying", 0, np.inf),
+            ("leash", 0, np.inf), ("straying", 0, np.inf), ("agreement", 0, np.inf),
             ("rigid_rounds", 0, 1000), ("rigid_reach", 1e-6, np.inf), ("rigid_tolerance", 1e-6, np.inf),
         )  # fmt: skip
         for name, least, most in bounds:
@@ -208,20 +211,7 @@ class Anchored:
         )
         bridged = along.measured(pair, "bridged") if self.bridged else along
         ground = Ground(pair, basis, along, bridged, Orientation.of(pair, along.points))
-        nothing = np.empty(0, dtype=np.int64)
-        best = Grown(-1.0, -np.inf, np.empty((0, 0)), nothing, nothing)
-        for start in STARTS[: self.starts]:
-            rows = yield from self._anchored(ground, start)
-            best = max(best, (yield from self._tried(ground, rows)))
-            if best.score >= self.enough:
-                break
-        best = yield from self._repeated(ground, best)
-        for start in LAST_STARTS[: max(0, self.starts - len(STARTS))]:
-            if best.score >= self.enough:
-                break
-            rows = yield from self._anchored(ground, start)
-            other = yield from self._tried(ground, rows)
-            best = max(best, (yield from self._repeated(ground, other)))
+        best = yield from self._searched(ground)
         if self.last_steps:
             best = max(best, (yield from self._grown(ground, best.rows, self.last_steps)))
             best = yield from self._leashed(ground, best)
@@ -235,6 +225,32 @@ class Anchored:
         if not self.between_vertices:
             return Correspondence.between_vertices(pair, everywhere, nearest, confidence)
         return Correspondence.of_every_vertex(pair, found, confidence)
+
+    def _searched(self, ground: Ground) -> Generator[Problem, Solved, Grown]:
+        """Grow a map from each start until the best is sure, and return that one."""
+        first, last = ([start for start in group if start.bridged or self.bridged] for group in (STARTS, LAST_STARTS))
+        maps: list[Grown] = []
+        for start in first[: self.starts]:
+            rows = yield from self._anchored(ground, start)
+            maps.append((yield from self._tried(ground, rows)))
+            if self._sure(ground, maps):
+                break
+        best = maps.index(max(maps))
+        maps[best] = yield from self._repeated(ground, maps[best])
+        for start in last[: max(0, self.starts - len(first))]:
+            if self._sure(ground, maps):
+                break
+            rows = yield from self._anchored(ground, start)
+            maps.append((yield from self._tried(ground, rows)))
+            if not self._sure(ground, maps):
+                maps[-1] = yield from self._repeated(ground, maps[-1])
+        return max(maps)
+
+    def _sure(self, ground: Ground, maps: list[Grown]) -> bool:
+        """Tell whether the best map has enough confidence, or another start has led to nearly the same one."""
+        best = max(maps)
+        agreeing = (ground.agreement(best, other) >= self.agreement for other in maps if other is not best)
+        return best.score >= self.enough or any(agreeing)
 
     def _anchored(self, ground: Ground, start: Start) -> Generator[Problem, Solved, IntArray]:
         """Play the games of a start, and place the samples by their winners and then by one another."""

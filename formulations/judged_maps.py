@@ -20,6 +20,10 @@ _LIKENESS = 5.0
 is slid along a limb may keep distances as well as the true one, but its descriptors agree less."""
 
 
+_TOGETHER = 0.04
+"""Distance in space, in units of sqrt(full area), up to which two maps put a sample in the same place."""
+
+
 @dataclass(frozen=True, eq=False)
 class Ground:
     """Hold what maps of a pair are made of, and samples with distances on the part measured in two ways.
@@ -58,6 +62,12 @@ class Ground:
             way.confidence(self.pair, vertices, nearest, width=KEEPING) for way in (self.along, self.bridged)
         )
         return np.asarray(0.5 * (along + bridged))
+
+    def agreement(self, one: Grown, other: Grown) -> float:
+        """Return the share of the samples that two maps put in the same place."""
+        where = self.pair.full.mesh.vertices
+        apart = np.linalg.norm(where[one.images] - where[other.images], axis=1)
+        return float(np.mean(apart <= _TOGETHER))
 
     def judged(self, C: FloatArray, rows: IntArray, images: IntArray) -> Grown:
         """Return a map with how good it is; samples in patches that it turns over have no confidence.

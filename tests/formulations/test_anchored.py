@@ -132,6 +132,7 @@ def test_a_map_that_stays_unsure_is_started_in_every_way(creature: PairData) -> 
         oriented=False,
         starts=len(STARTS + LAST_STARTS),
         enough=2.0,
+        agreement=2.0,
         unsure=2.0,
         repeats=1,
         steps=2,
@@ -147,6 +148,35 @@ def test_a_map_that_stays_unsure_is_started_in_every_way(creature: PairData) -> 
         solution.problem for solution in match(Pair.of(part, creature.full), replace(hopeless, enough=0.0)).solutions
     ]
     assert sure[:3] == ["game", "map", "map"]
+
+
+def test_two_starts_that_lead_to_the_same_map_are_enough(creature: PairData) -> None:
+    pair = Pair.of(random_rigid_motion(creature.part)[0], creature.full)
+    few = replace(SMALL, oriented=False, starts=6, enough=2.0, unsure=0.0, repeats=0, steps=2, last_steps=0)
+    maps = {
+        share: [solution.problem for solution in match(pair, replace(few, agreement=share)).solutions].count("map")
+        for share in (0.0, 2.0)
+    }
+    assert maps == {0.0: 2 * 2, 2.0: 2 * 6}
+    assert [solution.problem for solution in match(pair, replace(few, agreement=2.0, bridged=False)).solutions].count(
+        "map"
+    ) == 2 * sum(start.bridged for start in STARTS + LAST_STARTS)  # the others would repeat them
+
+
+def test_agreement_is_the_share_of_samples_in_the_same_place(creature: PairData) -> None:
+    pair = Pair.of(creature.part, creature.full)
+    descriptors = trusted_descriptors(pair, SMALL.radii, power=1.0)
+    along = sampled_distances(pair, descriptors, part_samples=20, placed_samples=40, full_samples=70)
+    basis = bases(
+        pair, descriptors, part_size=30, full_size=60, descriptor_weight=0.01, components=9, last_components=9
+    )
+    ground = Ground(pair, basis, along, along, Orientation.of(pair, along.points))
+    images = along.grid[:40]
+    far = images.copy()
+    far[:10] = along.grid[60:70]
+    here, there = (ground.judged(np.eye(60, 30), np.arange(40), one) for one in (images, far))
+    assert ground.agreement(here, here) == 1.0
+    assert ground.agreement(here, there) == 0.75
 
 
 def test_a_map_that_stays_unsure_also_grows_on_a_leash(creature: PairData) -> None:
