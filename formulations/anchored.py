@@ -28,6 +28,10 @@ _GAIN = 0.002
 _HELD = 0.02
 """Worth that a map has to gain on a leash: it is held to images that keep distances, wrong ones as well."""
 
+_WITNESSES = 2
+"""Other starts that have to lead to the best map, for no other to be tried. One is not enough: starts share candidates,
+and two of them may go wrong in the same way."""
+
 _SETTLED = 0.005
 """Share of the samples in patches that are turned over, up to which a map need not be fitted once more."""
 
@@ -77,7 +81,7 @@ class Anchored:
        whose front and back are exchanged, are turned back. Where its mean confidence is low, as on parts torn by many
        holes, it also grows on a leash: images far from where the surest ones place them are put there.
     4. Several starts are tried, which differ in the game and in whether ways on the part may cross what was cut out,
-       until a map is sure or two starts have led to the same one. Of two maps the better one has the higher mean
+       until a map is sure or three starts have led to the same one. Of two maps the better one has the higher mean
        confidence, with the likeness of descriptors counted in.
     5. Where the mean confidence of the best map stays low, its best images become anchors in their turn, and steps 2
        and 3 are done again while that makes it better.
@@ -117,8 +121,8 @@ class Anchored:
         `nonrigid.geometry.geodesics.BridgedGeodesics`.
     starts, enough, agreement
         Largest number of starts, of `STARTS` and then of `LAST_STARTS`; no other is tried once the best map has a mean
-        confidence of `enough`, or a share `agreement` of its samples lie where another start's map puts them as well:
-        starts that go wrong rarely do so in the same way.
+        confidence of `enough`, or two other starts' maps put a share `agreement` of its samples in the same places:
+        starts that go wrong rarely all do so in the same way.
     repeats
         How often, at most, the images of a map that is not sure enough become anchors again.
     unsure
@@ -166,7 +170,7 @@ class Anchored:
     bridged: bool = True
     starts: int = 6
     enough: float = 0.85
-    agreement: float = 0.95
+    agreement: float = 0.9
     repeats: int = 3
     unsure: float = 0.8
     leash: float = 0.04
@@ -247,10 +251,10 @@ class Anchored:
         return max(maps)
 
     def _sure(self, ground: Ground, maps: list[Grown]) -> bool:
-        """Tell whether the best map has enough confidence, or another start has led to nearly the same one."""
+        """Tell whether the best map has enough confidence, or other starts have led to nearly the same one."""
         best = max(maps)
-        agreeing = (ground.agreement(best, other) >= self.agreement for other in maps if other is not best)
-        return best.score >= self.enough or any(agreeing)
+        agreeing = [ground.agreement(best, other) >= self.agreement for other in maps if other is not best]
+        return best.score >= self.enough or sum(agreeing) >= _WITNESSES
 
     def _anchored(self, ground: Ground, start: Start) -> Generator[Problem, Solved, IntArray]:
         """Play the games of a start, and place the samples by their winners and then by one another."""
