@@ -101,6 +101,18 @@ def test_dijkstra_agrees_with_itself_near_and_far() -> None:
     assert (found <= 1.12 * straight + 1e-9).all()
 
 
+def test_distances_are_exact_as_far_as_they_are_wanted() -> None:
+    full, rng = PAIR.full, np.random.default_rng(4)
+    a, b = rng.integers(0, len(full.vertices), (2, 400))
+    true = vertex_pair_distances(full, a, b)
+    up_to = rng.uniform(0.0, 1.0, 400) * np.sqrt(full.area)
+    found = vertex_pair_distances(full, a, b, up_to=up_to)
+    assert 0 < np.isinf(found).sum() < 400
+    np.testing.assert_array_equal(found[true <= up_to], true[true <= up_to])
+    beyond = found[true > up_to]
+    assert (np.isinf(beyond) | (beyond == true[true > up_to])).all()
+
+
 def test_unmatched_points_have_no_error_and_bad_ones_are_refused() -> None:
     a = SurfacePoints([-1, 0], [[0, 0, 0], [1, 0, 0]])
     errors = geodesic_errors(PLANE, a, some_points(PLANE, 2, 0))
