@@ -52,16 +52,16 @@ def players(settings: GameSettings, pair: Pair) -> Candidates:
 
     Those depend on no part: in the cache, they serve every part of that surface.
     """
-    pair.full.distances_between(
-        pair.full.samples(min(settings.full_samples, len(pair.full.mesh.vertices))), settings.geodesics
-    )
-    return candidate_matches(
+    matches = candidate_matches(
         pair,
         part_samples=settings.part_samples,
         full_samples=settings.full_samples,
         per_sample=settings.per_sample,
         radii=settings.radii,
     )
+    samples = pair.full.samples(min(settings.full_samples, len(pair.full.mesh.vertices)))
+    pair.full.distances_between(samples, settings.geodesics)
+    return matches
 
 
 def local_players(settings: GameSettings, pair: Pair, matches: Candidates, anchors: Candidates) -> Candidates:
