@@ -57,11 +57,11 @@ def accuracy_of(limits: Limits) -> str:
 def is_accepted(solution: Solution, limits: Limits) -> bool:
     """Tell whether a solution is as exact as asked, by our own measurement whatever its solver reports.
 
-    Accepted is a violation of at most `feasibility` with a stationarity of at most tolerance * max(1, |objective|), or
-    with a bound that certifies it.
+    Accepted is a violation of at most `feasibility` with a bound that certifies it, or, of a stationary point, with a
+    stationarity of at most tolerance * max(1, |objective|). A rounded point of integers has no first-order test.
     """
     if not solution.violation <= limits.feasibility:
         return False
-    if solution.status is Status.CERTIFIED:
-        return True
+    if solution.status is not Status.STATIONARY:
+        return solution.status is Status.CERTIFIED
     return solution.stationarity <= limits.tolerance * max(1.0, abs(solution.objective))

@@ -27,6 +27,10 @@ from nonrigid.geometry.errors import NonrigidError
 _Complaint: type[Exception] = typer.BadParameter.__mro__[2]
 
 
+_INTERRUPTED = 130
+"""Exit code after Ctrl-C, as shells have it: 128 and the number of the signal."""
+
+
 class OneLineErrors(TyperGroup):
     """Report what the user can mend in one line on standard error, with exit code 2 and no traceback."""
 
@@ -39,7 +43,7 @@ class OneLineErrors(TyperGroup):
         windows_expand_args: bool = True,
         **extra: Any,
     ) -> Any:
-        """Run a command and leave with its exit code: 0 done, 1 a solve failed or was interrupted, 2 bad input."""
+        """Run a command and leave with its exit code: 0 done, 1 a solve failed, 2 bad input, 130 interrupted."""
         try:
             code = super().main(
                 args=args,
@@ -54,7 +58,9 @@ class OneLineErrors(TyperGroup):
         except _Complaint as error:
             code = _complain(error.format_message())  # type: ignore[attr-defined]
         except (typer.Abort, KeyboardInterrupt):
-            code = _complain("interrupted; finished runs are kept", code=1)
+            code = _INTERRUPTED
+        if code == _INTERRUPTED:  # to which newer versions of typer turn Ctrl-C themselves
+            code = _complain("interrupted; finished runs are kept", code=_INTERRUPTED)
         sys.exit(code if isinstance(code, int) else 0)
 
 

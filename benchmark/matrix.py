@@ -100,7 +100,7 @@ def stated_problems(pair: Pair, formulation: Formulation) -> dict[str, Problem]:
         while True:
             found.setdefault(problem.name, problem)
             solution = solve(problem, limits=Limits(seconds=5.0))
-            if not solution.status.usable:
+            if not solution.usable:
                 break
             problem = stages.send(solution)
     except StopIteration:

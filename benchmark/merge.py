@@ -26,19 +26,20 @@ def merge_results(folders: Sequence[Path], out: Path) -> list[Record]:
     Raises
     ------
     InputError
-        If a folder holds no results, `out` holds some already, the folders are of different data sets or metrics, or
-        two of them hold a run of the same id with other results: the message names the runs.
+        If a folder holds no results, `out` holds some already, the folders are of different data sets or metrics; or
+        two of them hold a run of the same id with other results, or under the same label and backend runs of a pair
+        with other settings: the message names the runs.
     """
     stores = [Store(folder) for folder in folders]
     indices = [store.index() for store in stores]
     target = Store(out)
     if (out / "index.json").exists():
         raise InputError("holds results already", file=out, remedy="name a new folder")
-    for key in ("dataset", "metric"):
+    for key in ("dataset", "data", "metric"):
         for folder, index in zip(folders, indices, strict=True):
-            if index[key] != indices[0][key]:
+            if index.get(key) != indices[0].get(key):
                 raise InputError(
-                    f"its {key} is {index[key]}, that of {folders[0]} {indices[0][key]}",
+                    f"its {key} is {index.get(key)}, that of {folders[0]} {indices[0].get(key)}",
                     file=folder,
                     remedy="merge results of one data set and metric",
                 )
@@ -47,6 +48,7 @@ def merge_results(folders: Sequence[Path], out: Path) -> list[Record]:
         labels |= {run: label for run, label in index["runs"].items() if run not in labels}
     holders = {run: [store for store in stores if store.has(run)] for run in labels}
     _refuse_conflicts(holders)
+    _refuse_twins(labels, holders)
     target.prepare()
     with target.writing():
         for store in reversed(stores):
@@ -86,6 +88,25 @@ def _refuse_conflicts(holders: dict[str, list[Store]]) -> None:
             f"{len(conflicts)} runs have different results: {'; '.join(conflicts[:5])}{more}",
             remedy="delete the wrong one of each (runs/<id>.json), or merge folders of one version of the package",
         )
+
+
+def _refuse_twins(labels: dict[str, str], holders: dict[str, list[Store]]) -> None:
+    """Raise `InputError` where runs with other settings, seeds apart, would stand in one row of a table."""
+    seen: dict[tuple[object, ...], tuple[list[object], Store]] = {}
+    for run, held in holders.items():
+        if not held:
+            continue
+        record = held[0].read_run(run)
+        key = (labels[run], *(record.get(name) for name in ("pair", "backend", "accuracy")))
+        settings = [record.get(name) for name in ("method", "settings", "starts", "limits")]
+        first, store = seen.setdefault(key, (settings, held[0]))
+        if settings != first:
+            raise InputError(
+                f"{labels[run]!r} with {record['backend']} on {record['pair']} has other settings than in"
+                f" {store.folder}",
+                file=held[0].folder,
+                remedy="give each its own label in its plan",
+            )
 
 
 def _agree(one: object, other: object) -> bool:

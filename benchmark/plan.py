@@ -16,7 +16,7 @@ from nonrigid.benchmark import datasets, plans
 from nonrigid.benchmark.accuracy import with_accuracy
 from nonrigid.benchmark.choices import parse_backend
 from nonrigid.benchmark.datasets.protocols import Dataset, PairSpec
-from nonrigid.benchmark.methods import make_method
+from nonrigid.benchmark.methods import make_method, typed_settings
 from nonrigid.benchmark.vertex_pairs import check_metric
 from nonrigid.formulations.formulation import Formulation
 from nonrigid.geometry.errors import InputError, NonrigidError, UnknownNameError
@@ -190,8 +190,8 @@ def _plan(table: Mapping[str, Any], place: Path, text: str, data: Path | None) -
         methods=entries,
         backends=backends,
         starts=starts,
-        seed=_whole(table, "seed", 0),
-        motion_seed=None if motion is False else _whole(table, "motion_seed", 0),
+        seed=_seed(table, "seed"),
+        motion_seed=None if motion is False else _seed(table, "motion_seed"),
         metric=metric,
         limits=limits,
         accuracy=accuracy,
@@ -213,6 +213,8 @@ def _dataset(word: str, settings: dict[str, Any], splits: tuple[str, ...], place
         settings["templates"] = place.parent / str(settings["templates"])
     if splits and "splits" in known:
         settings["splits"] = splits
+    plain = {name: value for name, value in settings.items() if name not in ("root", "templates", "splits")}
+    settings |= typed_settings(kind, plain, owner=f"[data] of {word}")
     try:
         made: Dataset = kind(**settings)
     except TypeError as error:
@@ -304,6 +306,13 @@ def _whole(table: Mapping[str, object], key: str, default: int) -> int:
     value = table.get(key, default)
     if isinstance(value, bool) or not isinstance(value, int):
         raise InputError(f"{key} is {value!r}", remedy="give a whole number")
+    return value
+
+
+def _seed(table: Mapping[str, object], key: str) -> int:
+    value = _whole(table, key, 0)
+    if value < 0:
+        raise InputError(f"{key} is {value}", remedy="give a number of at least 0")
     return value
 
 

@@ -218,7 +218,7 @@ def _stage(solution: Solution, seen: tuple[int, str | None]) -> Record:
         "sense": solution.sense.value,
         "solver": solution.spec,
         "status": solution.status.value,
-        "usable": solution.status.usable,
+        "usable": solution.usable,
         "message": solution.message,
         "raw_status": solution.raw_status,
         "route": list(solution.route),

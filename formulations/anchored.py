@@ -16,11 +16,20 @@ from nonrigid.formulations.judged_maps import KEEPING, Ground, Grown
 from nonrigid.formulations.local_rigidity import moved_together
 from nonrigid.formulations.model import ElasticNet, Problem
 from nonrigid.formulations.orientation import Orientation
+from nonrigid.formulations.ranges import (
+    ABOVE_NONE,
+    BELOW_ONE,
+    COUNT,
+    COUNT_OR_NONE,
+    NOT_NEGATIVE,
+    POSITIVE,
+    SHARE,
+    check_ranges,
+)
 from nonrigid.formulations.sampled_distances import SampledDistances, sampled_distances
 from nonrigid.formulations.spectral_growth import bases, grown
 from nonrigid.formulations.trusted_descriptors import trusted_descriptors
 from nonrigid.geometry.arrays import IntArray
-from nonrigid.geometry.errors import InputError
 
 _GAIN = 0.002
 """Worth that a map has to gain when it grows again, for another time to be worth its while; see `Grown`."""
@@ -67,6 +76,20 @@ LAST_STARTS = (
 )
 """Starts that are tried where these do not suffice: many anchors, and few. They come last, because on thin strips many
 anchors may slide along the strip and agree all the better."""
+
+
+_RANGES = {
+    **dict.fromkeys(("part_samples", "full_samples", "per_sample", "fitted_samples", "steps"), COUNT),
+    **dict.fromkeys(("first_size", "components", "last_components", "part_size", "full_size"), COUNT),
+    **dict.fromkeys(("last_steps", "rounds", "repeats", "rigid_rounds"), COUNT_OR_NONE),
+    "starts": (1, len(STARTS + LAST_STARTS)),
+    **dict.fromkeys(("radii", "kernel_width", "reach", "local_reach", "rigid_reach", "rigid_tolerance"), POSITIVE),
+    **dict.fromkeys(("trust_power", "placing_weight", "growing_weight"), NOT_NEGATIVE),
+    **dict.fromkeys(("enough", "agreement", "unsure", "leash", "straying"), NOT_NEGATIVE),
+    "mix": SHARE,
+    "floor": BELOW_ONE,
+    "kept": ABOVE_NONE,
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -187,15 +210,7 @@ class Anchored:
 
     def stages(self, pair: Pair) -> Stages:
         """State the game, then one map a step; return one point a vertex of the part."""
-        bounds = (
-            ("steps", 1, 1000), ("last_steps", 0, 1000), ("repeats", 0, 1000), ("starts", 1, len(STARTS + LAST_STARTS)),
-            ("leash", 0, np.inf), ("straying", 0, np.inf), ("agreement", 0, np.inf),
-            ("rigid_rounds", 0, 1000), ("rigid_reach", 1e-6, np.inf), ("rigid_tolerance", 1e-6, np.inf),
-        )  # fmt: skip
-        for name, least, most in bounds:
-            value = getattr(self, name)
-            if not least <= value <= most:
-                raise InputError(f"{name} is {value}", remedy=f"give a number from {least} to {most}")
+        check_ranges(self, _RANGES)
         descriptors = trusted_descriptors(pair, self.radii, power=self.trust_power)
         along = sampled_distances(
             pair,

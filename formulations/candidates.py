@@ -15,6 +15,9 @@ from nonrigid.geometry.surface import Surface
 COSINE_BINS = 10
 """Values of the cosine in the SHOT descriptors compared here: 320 columns a radius."""
 
+LARGEST_EMPTY = 0.5
+"""Share of vertices without a descriptor above which a surface is refused: nearest descriptors would mean nothing."""
+
 
 @dataclass(frozen=True, eq=False)
 class Candidates:
@@ -63,10 +66,30 @@ class Candidates:
 
 
 def describe(surface: Surface, radii: tuple[float, ...]) -> FloatArray:
-    """Return (n, d) unit rows: SHOT at each radius side by side, radii in units of sqrt(full area)."""
+    """Return (n, d) unit rows: SHOT at each radius side by side, radii in units of sqrt(full area).
+
+    A vertex with too few neighbours for any of them has a row of zeros; see `require_descriptors`.
+    """
     rows = np.hstack([surface.shot(radius, cosine_bins=COSINE_BINS) for radius in radii])
     length = np.linalg.norm(rows, axis=1, keepdims=True)
     return np.asarray(np.divide(rows, length, out=np.zeros_like(rows), where=length > 0))
+
+
+def require_descriptors(pair: Pair, radii: tuple[float, ...]) -> None:
+    """Raise `InputError` if no radius is given, or most vertices of a surface have no descriptor at any of them.
+
+    SHOT needs five neighbours within its radius. Where most have none, the nearest descriptors mean nothing.
+    """
+    if not radii:
+        raise InputError("radii is empty", remedy="give at least one number")
+    for surface in (pair.part, pair.full):
+        known = np.any([surface.shot(radius, cosine_bins=COSINE_BINS).any(axis=1) for radius in radii], axis=0)
+        if known.mean() < 1.0 - LARGEST_EMPTY:
+            raise InputError(
+                f"{1.0 - known.mean():.0%} of the vertices of {surface.raw.name} have too few neighbours within"
+                f" {max(radii):g} sqrt(full area) for a descriptor",
+                remedy="give larger radii, or a finer mesh",
+            )
 
 
 def principal_axes(rows: FloatArray, count: int) -> FloatArray:
@@ -103,7 +126,7 @@ def candidate_matches(
     Raises
     ------
     InputError
-        If a number is below 1.
+        If a number is below 1, or most vertices have no descriptor.
 
     Source: pre-selection by descriptor in Rodola, Bronstein, Albarelli, Bergamasco and Torsello (CVPR 2012), with
     SHOT in place of heat kernels, which parts disturb near their boundary.
@@ -111,6 +134,7 @@ def candidate_matches(
     for name, value in (("part_samples", part_samples), ("full_samples", full_samples), ("per_sample", per_sample)):
         if value < 1:
             raise InputError(f"{name} is {value}", remedy="give a number of at least 1")
+    require_descriptors(pair, radii)
     some = pair.part.samples(min(part_samples, len(pair.part.mesh.vertices)))
     others = pair.full.samples(min(full_samples, len(pair.full.mesh.vertices)))
     alike, cost = nearest_rows(

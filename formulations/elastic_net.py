@@ -8,6 +8,7 @@ from typing import ClassVar
 from nonrigid.formulations.formulation import Pair, Stages
 from nonrigid.formulations.games import GameSettings, game, local_players, payoffs, players, read_out
 from nonrigid.formulations.model import ElasticNet
+from nonrigid.formulations.ranges import BELOW_ONE, SHARE, check_ranges
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,6 +47,7 @@ class ElasticNetMatching(GameSettings):
 
     def stages(self, pair: Pair) -> Stages:
         """State the problem on the candidates, then on those around its matches; read the matches out."""
+        check_ranges(self, {"mix": SHARE, "floor": BELOW_ONE})
         matches = players(self, pair)
         surface = ElasticNet(mix=self.mix)
         share = (yield game("elastic-net", payoffs(self, pair, matches, keep=True), surface))["u"]

@@ -13,12 +13,17 @@ from nonrigid.formulations.model import Problem
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.cache import Cache
 from nonrigid.geometry.errors import InputError
+from nonrigid.geometry.geodesics.protocol import checked_vertices
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.points import SurfacePoints
 from nonrigid.geometry.surface import Surface
 
 LARGEST_PART = 1.1
 """Area of a part, in units of the full area, above which a pair is refused: poses stretch areas by a few per cent."""
+
+
+SMALLEST_PART = 1e-3
+"""Area of a part, in units of the full area, below which a pair is refused: mostly its unit of length is another."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -41,7 +46,7 @@ class Pair:
         ------
         InputError
             If a mesh cannot be repaired into one connected surface, or the part's area exceeds the full one's by more
-            than a tenth.
+            than a tenth or is less than a thousandth of it.
 
         Examples
         --------
@@ -53,7 +58,7 @@ class Pair:
         """
         whole, piece = Surface(full, cache=cache), Surface(part, cache=cache)
         ratio = piece.area / whole.area
-        if ratio > LARGEST_PART:
+        if not SMALLEST_PART <= ratio <= LARGEST_PART:
             raise InputError(
                 f"the part {part.name} has {ratio:.3g} times the area of the full surface {full.name}",
                 remedy="give the part first and the full surface second, both in the same unit of length",
@@ -104,9 +109,28 @@ class Correspondence:
     def between_vertices(
         cls, pair: Pair, part_vertices: ArrayLike, full_vertices: ArrayLike, confidence: ArrayLike | None = None
     ) -> Correspondence:
-        """Return the correspondence of vertices of the repaired views, in the numbers of the files."""
-        part, full = np.asarray(part_vertices, dtype=np.int64), np.asarray(full_vertices, dtype=np.int64)
+        """Return the correspondence of vertices of the repaired views, in the numbers of the files.
+
+        Parameters
+        ----------
+        part_vertices, full_vertices
+            (m,) each.
+        confidence
+            (m,) between 0 and 1; all 1 unless given.
+
+        Raises
+        ------
+        InputError
+            If lengths disagree, or a number is not that of a vertex.
+        """
+        part = checked_vertices(part_vertices, len(pair.part.mesh.vertices), "part")
+        full = checked_vertices(full_vertices, len(pair.full.mesh.vertices), "full")
         sure = np.ones(len(part)) if confidence is None else np.asarray(confidence, dtype=float)
+        if not len(part) == len(full) == len(sure):
+            raise InputError(
+                f"{len(part)} vertices of the part, {len(full)} of the full surface, {len(sure)} confidences",
+                remedy="give one of each a match",
+            )
         points = pair.full.clean_view.to_raw(SurfacePoints.at_vertices(pair.full.mesh, full))
         raw, first = np.unique(pair.part.clean_view.raw_of_vertex[part], return_index=True)
         return cls(raw, points[first], sure[first])
@@ -128,7 +152,14 @@ class Correspondence:
         return part[known], full[known]
 
     def dense(self, vertex_count: int) -> SurfacePoints:
-        """Return one point for each vertex of the part, unmatched where there is none: the form of a `.corr` file."""
+        """Return one point for each vertex of the part, unmatched where there is none: the form of a `.corr` file.
+
+        Raises
+        ------
+        InputError
+            If a matched vertex is not one of `vertex_count`.
+        """
+        checked_vertices(self.part_vertices, vertex_count, "part")
         faces, weights = np.full(vertex_count, -1, dtype=np.int64), np.zeros((vertex_count, 3))
         faces[self.part_vertices], weights[self.part_vertices] = self.points.faces, self.points.barycentric
         return SurfacePoints(faces, weights)

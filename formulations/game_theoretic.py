@@ -13,6 +13,7 @@ from nonrigid.formulations.candidates import Candidates
 from nonrigid.formulations.formulation import Pair, Solved, Stages
 from nonrigid.formulations.games import GameSettings, game, local_players, payoffs, players, read_out
 from nonrigid.formulations.model import Problem, Simplex
+from nonrigid.formulations.ranges import COUNT, SHARE, check_ranges
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.errors import InputError
 
@@ -58,8 +59,7 @@ class GameTheoretic(GameSettings):
 
     def stages(self, pair: Pair) -> Stages:
         """State the game (once a peeled group), then the local game; return one match a surviving sample."""
-        if self.groups < 1:
-            raise InputError(f"groups is {self.groups}", remedy="peel at least one group")
+        check_ranges(self, {"groups": COUNT, "group_quality": SHARE, "agreement": SHARE})
         matches = players(self, pair)
         share = yield from self._play("game", pair, matches, groups=self.groups)
         if self.local_candidates:
@@ -74,6 +74,10 @@ class GameTheoretic(GameSettings):
 
         Return the share of each candidate in the winning coalition.
         """
+        if len(matches) < 2:
+            raise InputError(
+                f"{len(matches)} candidate matches are no game", remedy="give more samples, or more candidates of each"
+            )
         payoff = payoffs(self, pair, matches, keep=name == "game")
         found: list[tuple[IntArray, FloatArray]] = []
         rest = np.arange(len(matches))

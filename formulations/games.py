@@ -11,6 +11,7 @@ from nonrigid.formulations.distortion import Sides, consistency
 from nonrigid.formulations.formulation import Correspondence, Pair
 from nonrigid.formulations.localisation import local_matches
 from nonrigid.formulations.model import Problem, QuadraticForm, Set, Variable, maximize
+from nonrigid.formulations.ranges import COUNT, COUNT_OR_NONE, NOT_NEGATIVE, POSITIVE, SHARE, check_ranges
 from nonrigid.geometry.arrays import FloatArray
 
 
@@ -47,11 +48,26 @@ class GameSettings:
     local_reach: float = 0.15
 
 
+_RANGES = {
+    **dict.fromkeys(("part_samples", "full_samples", "per_sample"), COUNT),
+    **dict.fromkeys(("kernel_width", "radii"), POSITIVE),
+    "local_candidates": COUNT_OR_NONE,
+    "local_reach": NOT_NEGATIVE,
+    "excess_weight": SHARE,
+}
+
+
 def players(settings: GameSettings, pair: Pair) -> Candidates:
     """Return the candidates of the first game, with the distances between all samples of the full surface known.
 
     Those depend on no part: in the cache, they serve every part of that surface.
+
+    Raises
+    ------
+    InputError
+        If a setting is out of range, or most vertices have no descriptor.
     """
+    check_ranges(settings, _RANGES)
     matches = candidate_matches(
         pair,
         part_samples=settings.part_samples,

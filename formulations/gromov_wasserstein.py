@@ -14,10 +14,14 @@ from nonrigid.formulations.model.terms.gromov_wasserstein import GromovWasserste
 from nonrigid.formulations.model.terms.linear import Linear
 from nonrigid.formulations.model.transport_sets import PartialTransport
 from nonrigid.formulations.partial_zoomout import GrowthSettings, growth, sample_areas
+from nonrigid.formulations.ranges import COUNT, check_ranges
 from nonrigid.formulations.sampled_distances import SampledDistances, sampled_distances
 from nonrigid.formulations.trusted_descriptors import trusted_descriptors
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.geometry.errors import InputError
+
+NO_AREA = 1e-12
+"""What stands for an area of 0, in units of the full area: masses and capacities have to be positive."""
 
 LIKENESS = 0.05
 """Squared difference of unit descriptors by which a match of the start that goes by looks falls to 1/e."""
@@ -77,6 +81,8 @@ class PartialGromovWasserstein(GrowthSettings):
         for weight in (self.look_weight, *self.look_weights):
             if not (np.isfinite(weight) and weight >= 0.0):
                 raise InputError(f"a look weight is {weight}", remedy="give a number that is not negative")
+        self.check()
+        check_ranges(self, {"part_samples": COUNT, "full_samples": COUNT})
         descriptors = trusted_descriptors(pair, self.radii, power=self.trust_power)
         samples = sampled_distances(
             pair,
@@ -90,7 +96,9 @@ class PartialGromovWasserstein(GrowthSettings):
         return (yield from growth(self, pair, descriptors, samples.points, images))
 
     def _plans(self, pair: Pair, samples: SampledDistances) -> PartialTransport:
-        mass, capacity = sample_areas(pair.part, samples.points), sample_areas(pair.full, samples.grid)
+        areas = sample_areas(pair.part, samples.points), sample_areas(pair.full, samples.grid)
+        # Of two vertices in the same place one has all the area.
+        mass, capacity = (np.maximum(area, NO_AREA) for area in areas)
         kept = float(mass.sum())
         # A part may be a little larger than the whole, by noise: then there must be room for it.
         room = max(self.room, (1.0 + 1e-9) * kept / float(capacity.sum()))

@@ -12,6 +12,7 @@ from nonrigid.formulations.model import Problem, Variable, minimize
 from nonrigid.formulations.model.assignment_sets import Assignment, PartialPermutation
 from nonrigid.formulations.model.terms.linear import Linear
 from nonrigid.formulations.model.terms.triple_distortion import TripleDistortion
+from nonrigid.formulations.ranges import ABOVE_NONE, COUNT, check_ranges
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.errors import InputError, UnknownNameError
 from nonrigid.geometry.surface import Surface
@@ -82,7 +83,7 @@ class IsometricMatching:
         sparse = Problem("sparse", minimize(TripleDistortion(ratio)(P)), P @ PartialPermutation(), start=even)
         chosen = (yield sparse)["P"]
         anchors = full[chosen.argmax(axis=1)]
-        rows = _far_samples(pair.part, self.matches)
+        rows = _far_samples(pair.part, min(self.matches, len(pair.full.mesh.vertices)))
         cost, columns = self._extension(pair, part, anchors, rows)
         X = Variable("X", cost.shape)
         solution = yield Problem("extension", minimize(Linear(cost)(X)), X @ Assignment())
@@ -101,16 +102,12 @@ class IsometricMatching:
                 f"sources is {self.sources}, part_samples {self.part_samples}, full_samples {self.full_samples}",
                 remedy="map at least 3 sources, and no more than there are samples on either surface",
             )
-        for name, value in (("matches", self.matches), ("per_sample", self.per_sample)):
-            if value < 1:
-                raise InputError(f"{name} is {value}", remedy="give a number of at least 1")
+        check_ranges(self, {"matches": COUNT, "per_sample": COUNT, "kept": ABOVE_NONE})
         if self.extension_samples < self.matches:
             raise InputError(
                 f"extension_samples is {self.extension_samples} and matches {self.matches}",
                 remedy="give at least as many samples of the full surface as matches",
             )
-        if not 0.0 < self.kept <= 1.0:
-            raise InputError(f"kept is {self.kept}", remedy="give a share between 0 and 1")
 
     def _samples(self, pair: Pair) -> tuple[IntArray, IntArray]:
         # Farthest points come in falling distance: the first are the evenly spaced ones.

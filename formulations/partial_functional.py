@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from nonrigid.formulations.candidates import describe, principal_axes
+from nonrigid.formulations.candidates import describe, principal_axes, require_descriptors
 from nonrigid.formulations.formulation import Correspondence, Pair, Solved, Stages
 from nonrigid.formulations.functional_maps import (
     diagonal_start,
@@ -26,6 +26,7 @@ from nonrigid.formulations.model.terms.gram_penalty import GramPenalty
 from nonrigid.formulations.model.terms.masked_data import MaskedBasis, MaskedData
 from nonrigid.formulations.model.terms.mumford_shah import MumfordShah
 from nonrigid.formulations.model.terms.weighted_squares import WeightedSquares
+from nonrigid.formulations.ranges import COUNT, COUNT_OR_NONE, NOT_NEGATIVE, POSITIVE, check_ranges
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.errors import InputError, UnknownNameError
 from nonrigid.geometry.geodesics import make_geodesics
@@ -38,6 +39,15 @@ _ENOUGH = 2e-3  # share of its energy by which a step in C has to lie below the 
 _TRIAL = 2  # rounds after which starts are compared: one region found for each
 _NEAR = 1.05  # starts with an energy up to this many times the lowest go on to the end
 _APART = 0.01  # unless their images lie nearer than this to those of one that does, mean, in sqrt(full area)
+
+
+_RANGES = {
+    **dict.fromkeys(("eigenfunctions", "rounds", "closest_point_samples", "start_samples", "components"), COUNT),
+    **dict.fromkeys(("map_evaluations", "region_evaluations"), COUNT),
+    **dict.fromkeys(("landmarks", "closest_point_iterations"), COUNT_OR_NONE),
+    **dict.fromkeys(("mask_weight", "orthogonality_weight", "area_weight", "edge_weight"), NOT_NEGATIVE),
+    **dict.fromkeys(("radii", "landmark_decay"), POSITIVE),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -125,6 +135,7 @@ class PartialFunctionalMap:
             anchors = yield from GameTheoretic().stages(pair)
             descriptors = self._near(pair, *anchors.view_vertices(pair))
         else:
+            require_descriptors(pair, self.radii)
             descriptors = describe(pair.part, self.radii), describe(pair.full, self.radii)
         joint = self.joint(pair, bases, descriptors)
         starts = self._starts(pair, bases)
@@ -163,9 +174,7 @@ class PartialFunctionalMap:
     def _check(self) -> None:
         if self.start not in _STARTS:
             raise UnknownNameError("start", self.start, _STARTS)
-        for name in ("eigenfunctions", "rounds", "closest_point_samples", "start_samples", "components"):
-            if getattr(self, name) < 1:
-                raise InputError(f"{name} is {getattr(self, name)}", remedy="give a number of at least 1")
+        check_ranges(self, _RANGES)
         if self.start in ("several", "descriptors") and not self.start_radii:
             raise InputError(f"start_radii is empty and start {self.start!r}", remedy="give a radius, such as 0.1")
 

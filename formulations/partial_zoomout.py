@@ -12,10 +12,11 @@ from nonrigid.formulations.elastic_net import ElasticNetMatching
 from nonrigid.formulations.formulation import Correspondence, Pair, Solved, Stages
 from nonrigid.formulations.game_theoretic import GameTheoretic
 from nonrigid.formulations.model import Problem
+from nonrigid.formulations.ranges import COUNT, NOT_NEGATIVE, POSITIVE, check_ranges
 from nonrigid.formulations.spectral_growth import Bases, bases, grown, map_fit
 from nonrigid.formulations.trusted_descriptors import TrustedDescriptors, trusted_descriptors
 from nonrigid.geometry.arrays import FloatArray, IntArray
-from nonrigid.geometry.errors import InputError, UnknownNameError
+from nonrigid.geometry.errors import UnknownNameError
 from nonrigid.geometry.surface import Surface
 
 From: TypeAlias = Literal["gt", "en", "descriptors"]
@@ -23,6 +24,15 @@ STARTS = ("gt", "en", "descriptors")
 
 KEEPING = 0.03
 """Length, in units of sqrt(full area), between a point and its image's features at which confidence is 1/2."""
+
+
+_RANGES = {
+    **dict.fromkeys(("fitted_samples", "grid_samples", "steps", "components", "last_components"), COUNT),
+    **dict.fromkeys(("part_size", "full_size"), COUNT),
+    "first_size": (2, COUNT[1]),
+    "radii": POSITIVE,
+    **dict.fromkeys(("trust_power", "descriptor_weight"), NOT_NEGATIVE),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +67,10 @@ class GrowthSettings:
     last_components: int = 200
     part_size: int = 100
     full_size: int = 200
+
+    def check(self) -> None:
+        """Raise `InputError` for a setting that is out of range."""
+        check_ranges(self, _RANGES)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,6 +114,7 @@ class PartialZoomOut(GrowthSettings):
         """State the start's problems, then one map a step; return one point a vertex of the part."""
         if self.start not in STARTS:
             raise UnknownNameError("start", self.start, STARTS)
+        self.check()
         descriptors = trusted_descriptors(pair, self.radii, power=self.trust_power)
         matches = yield from self._begun(pair, descriptors)
         return (yield from growth(self, pair, descriptors, *matches))
@@ -126,10 +141,6 @@ def growth(
     part, full
         (a,) matched vertices of the repaired views.
     """
-    for name, least in (("first_size", 2), ("steps", 1)):
-        value = getattr(settings, name)
-        if value < least:
-            raise InputError(f"{name} is {value}", remedy=f"give a number of at least {least}")
     basis = bases(
         pair,
         descriptors,

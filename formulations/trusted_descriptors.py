@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from nonrigid.formulations.candidates import describe
+from nonrigid.formulations.candidates import describe, require_descriptors
 from nonrigid.formulations.formulation import Pair
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.surface import Surface
@@ -55,7 +55,13 @@ def trusted_descriptors(pair: Pair, radii: tuple[float, ...], *, power: float) -
 
     The trust in a row is min(1, b / radius)^power with b the distance in space to the boundary of the part; at power 2
     it is the share of a disk that certainly lies on the part.
+
+    Raises
+    ------
+    InputError
+        If no radius is given, or most vertices have no descriptor.
     """
+    require_descriptors(pair, radii)
     return TrustedDescriptors(
         part=tuple(describe(pair.part, (radius,)) for radius in radii),
         full=tuple(describe(pair.full, (radius,)) for radius in radii),

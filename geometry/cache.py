@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-CACHE_VERSION = 1
+CACHE_VERSION = 2
 """Part of every key: raise it whenever a cached computation changes its result."""
 
 Arrays = dict[str, NDArray[np.generic]]

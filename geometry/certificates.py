@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial.distance import cdist
 
 from nonrigid.geometry.arrays import BoolArray, FloatArray
 from nonrigid.geometry.errors import InputError
@@ -25,7 +26,9 @@ def certified_pairs(mesh: Mesh, distances: ArrayLike, sources: ArrayLike, *, mar
 
     All boundary vertices are used, none is sampled away: leaving some out would raise the bound and certify too much.
     A path may also leave through the inside of a boundary edge; a `margin` of twice the longest boundary edge makes the
-    test strict there too. On a surface without boundary every finite distance is certified.
+    test strict there too. The proof needs exact distances: those along mesh edges are upper bounds, on both sides, and
+    certify pairs whose distance on the whole is shorter by as much as they are too long. On a surface without boundary
+    every finite distance is certified.
 
     Parameters
     ----------
@@ -81,7 +84,7 @@ def certified_pairs(mesh: Mesh, distances: ArrayLike, sources: ArrayLike, *, mar
     if not len(boundary):
         return np.isfinite(between)
     points = mesh.vertices[boundary]
-    chords = np.linalg.norm(points[:, None] - points, axis=2)
+    chords = cdist(points, points)
     bound = _min_plus(_min_plus(to_boundary, chords), np.ascontiguousarray(to_boundary.T)) - margin
     np.fill_diagonal(bound, np.inf)
     return np.asarray(np.isfinite(between) & (between <= np.minimum(bound, bound.T) * (1.0 + TIE)))

@@ -18,7 +18,8 @@ STRAY_SHARE = 0.01
 """Pieces without a common vertex with the largest are dropped below this share of the area, else refused."""
 
 PINCHED_SHARE = 0.1
-"""Pieces that hang on the largest by single vertices are dropped below this share of the area, else refused."""
+"""Pieces that hang on the largest by single vertices are dropped below this share of the area, else refused; so are
+all that are dropped, together."""
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -86,7 +87,8 @@ def clean(mesh: Mesh) -> CleanMesh:
     ------
     InputError
         If the area is zero, no face is left, or a piece is too large to drop: `PINCHED_SHARE` of the area where it
-        hangs on the largest piece by single vertices, `STRAY_SHARE` where it does not hang on it at all.
+        hangs on the largest piece by single vertices, `STRAY_SHARE` where it does not hang on it at all; or if all
+        pieces but the largest have `PINCHED_SHARE` together, as those of a file do in which triangles share no vertex.
 
     Examples
     --------
@@ -173,9 +175,10 @@ def _largest_piece(mesh: Mesh, faces: IntArray, kept: IntArray, raw_of_copy: Int
     pinched[piece] = touching == touching[piece == largest][0]
     too_large = shares >= np.where(pinched, PINCHED_SHARE, STRAY_SHARE)
     too_large[largest] = False
+    in_crumbs = 1.0 - shares[largest] >= PINCHED_SHARE
     stacked = _stacked_vertices(mesh.vertices[np.unique(raw_of_copy[faces])])
     hint = f" ({stacked} vertices lie in the place of another and are not merged)" if stacked else ""
-    if too_large.any():
+    if too_large.any() or in_crumbs:
         listed = ", ".join(f"{share:.1%}" for share in np.sort(shares)[::-1][:5])
         raise InputError(
             f"the surface falls into {len(areas)} pieces without a common edge, {(~pinched).sum()} of them without a"

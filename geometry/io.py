@@ -16,6 +16,8 @@ from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.tosca_forms import read_mat, read_vert_tri
 
 _Row = tuple[int, str]
+
+_LARGEST_NUMBER = 2**62
 """A line's 1-based number in its file, and its text without comments."""
 
 
@@ -158,12 +160,17 @@ def _triangle(row: int, line: str) -> list[int]:
     if words[0].isdecimal() and words[0] != "3":
         raise InputError(f"a face with {words[0]} corners", row=row, remedy="triangulate the mesh first")
     try:
-        corners = [int(word) for word in words[1:4]]
+        corners = [_number(word) for word in words[1:4]]
     except ValueError:
         corners = []
     if words[0] != "3" or len(corners) != 3:
         raise InputError(f"not a triangle `3 a b c`: {line[:60]!r}", row=row, remedy="mend this row")
     return corners
+
+
+def _number(word: str) -> int:
+    """Return the whole number of a word; one too large for a vertex number as the largest that is not."""
+    return min(max(int(word), -_LARGEST_NUMBER), _LARGEST_NUMBER)
 
 
 def _check_range(faces: IntArray, row_of_face: list[int], vertex_count: int) -> None:
@@ -202,7 +209,7 @@ def _read_obj(path: Path) -> tuple[FloatArray, IntArray]:
         if len(words) != 3:
             raise InputError(f"a face with {len(words)} corners", row=row, remedy="triangulate the mesh first")
         try:
-            numbers = [int(word.partition("/")[0]) for word in words]
+            numbers = [_number(word.partition("/")[0]) for word in words]
         except ValueError:
             raise InputError(f"not a triangle `f a b c`: {line[:60]!r}", row=row, remedy="mend this row") from None
         faces.append([number + seen if number < 0 else number - 1 for number in numbers])  # negative: counted back

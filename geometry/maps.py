@@ -28,7 +28,7 @@ def nearest_rows(
     Distances to all targets come from matrix products in `dtype`; every target that the rounding error of these
     products cannot exclude is measured again in double precision, so the answer is that of an exhaustive search in
     double precision, whatever `dtype` is. The lower number wins among equals. Unlike a search tree it takes the same
-    time however badly queries fit.
+    time however badly queries fit, unless very many targets tie.
 
     Parameters
     ----------
@@ -37,7 +37,8 @@ def nearest_rows(
     count
         How many neighbours, 1 to t.
     block
-        How many queries are compared at a time; memory is block * t numbers.
+        How many queries are compared at a time; memory is block * t numbers, some ten times that where nearly all
+        targets are equally near.
     dtype
         float32 or float64, the precision of the matrix products.
 

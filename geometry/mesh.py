@@ -8,11 +8,11 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from nonrigid.geometry.arrays import FloatArray, IntArray
+from nonrigid.geometry.arrays import FloatArray, IntArray, frozen
 from nonrigid.geometry.errors import InputError
 
 
@@ -67,7 +67,7 @@ class Mesh:
     @cached_property
     def face_areas(self) -> FloatArray:
         """(m,) triangle areas, in the squared unit of the vertices."""
-        return np.asarray(0.5 * np.linalg.norm(self._cross, axis=1))
+        return frozen(np.asarray(0.5 * np.linalg.norm(self._cross, axis=1)))
 
     @cached_property
     def area(self) -> float:
@@ -78,7 +78,7 @@ class Mesh:
     def vertex_areas(self) -> FloatArray:
         """(n,) a third of the area of the incident triangles; sums to `area`."""
         share = np.repeat(self.face_areas / 3.0, 3)
-        return np.asarray(np.bincount(self.faces.ravel(), share, len(self.vertices)), dtype=np.float64)
+        return frozen(np.asarray(np.bincount(self.faces.ravel(), share, len(self.vertices)), dtype=np.float64))
 
     @cached_property
     def vertex_normals(self) -> FloatArray:
@@ -87,7 +87,7 @@ class Mesh:
         for corner in range(3):
             np.add.at(normals, self.faces[:, corner], self._cross)
         length = np.linalg.norm(normals, axis=1, keepdims=True)
-        return np.asarray(np.divide(normals, length, out=np.zeros_like(normals), where=length > 0))
+        return frozen(np.asarray(np.divide(normals, length, out=np.zeros_like(normals), where=length > 0)))
 
     @cached_property
     def edges(self) -> IntArray:
@@ -98,12 +98,12 @@ class Mesh:
     def boundary_edges(self) -> IntArray:
         """(b, 2) undirected edges that exactly one triangle uses."""
         edges, counts = self._edges_and_counts
-        return np.asarray(edges[counts == 1])
+        return frozen(np.asarray(edges[counts == 1]))
 
     @cached_property
     def boundary_vertices(self) -> IntArray:
         """Sorted numbers of the vertices on the boundary."""
-        return np.unique(self.boundary_edges)
+        return frozen(np.unique(self.boundary_edges))
 
     @cached_property
     def boundary_loops(self) -> tuple[IntArray, ...]:
@@ -112,7 +112,7 @@ class Mesh:
         i, j = ends.reshape(-1, 2).T
         graph = coo_array((np.ones(len(i)), (i, j)), shape=(len(members), len(members)))
         piece = connected_components(graph, directed=False)[1] if len(members) else members
-        return tuple(members[piece == number] for number in np.unique(piece))
+        return tuple(frozen(members[piece == number]) for number in np.unique(piece))
 
     @cached_property
     def component_of_vertex(self) -> IntArray:
@@ -120,7 +120,7 @@ class Mesh:
         i, j = self.edges.T
         n = len(self.vertices)
         graph = coo_array((np.ones(len(i)), (i, j)), shape=(n, n))
-        return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+        return frozen(np.array(connected_components(graph, directed=False)[1], dtype=np.int64))
 
     def transformed(
         self, *, rotation: ArrayLike | None = None, translation: ArrayLike = 0.0, scale: float = 1.0
@@ -138,11 +138,11 @@ class Mesh:
     def _edges_and_counts(self) -> tuple[IntArray, IntArray]:
         directed = self.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
         edges, counts = np.unique(np.sort(directed, axis=1), axis=0, return_counts=True)
-        return edges, counts.astype(np.int64)
+        return frozen(edges), counts.astype(np.int64)
 
 
 def _checked_vertices(vertices: ArrayLike) -> FloatArray:
-    array = np.array(vertices, dtype=np.float64)
+    array = _table(vertices, "vertices").astype(np.float64)
     if array.ndim != 2 or array.shape[1] != 3:
         raise InputError(f"vertices have shape {array.shape}, not (n, 3)", remedy="give one row of x y z a vertex")
     bad = np.flatnonzero(~np.isfinite(array).all(axis=1))
@@ -151,22 +151,31 @@ def _checked_vertices(vertices: ArrayLike) -> FloatArray:
             f"{len(bad)} vertices are not finite, the first is vertex {bad[0]} (0-based)",
             remedy="remove or mend these vertices",
         )
-    array.setflags(write=False)
-    return array
+    return frozen(array)
 
 
 def _checked_faces(faces: ArrayLike, vertex_count: int) -> IntArray:
-    array = np.array(faces)
+    array = _table(faces, "faces")
     if array.size == 0:
         raise InputError("the mesh has no faces", remedy="give a triangle mesh, not a point cloud")
     if array.ndim != 2 or array.shape[1] != 3:
         raise InputError(f"faces have shape {array.shape}, not (m, 3)", remedy="triangulate the mesh first")
-    array = array.astype(np.int64)
-    bad = np.flatnonzero(((array < 0) | (array >= vertex_count)).any(axis=1))
+    wrong = ~((array >= 0) & (array < vertex_count) & (array == np.floor(array)))
+    bad = np.flatnonzero(wrong.any(axis=1))
     if len(bad):
         raise InputError(
-            f"face {bad[0]} (0-based) names vertex {array[bad[0]].max()} of {vertex_count}",
+            f"face {bad[0]} (0-based) names vertex {array[bad[0]][wrong[bad[0]]][0]} of {vertex_count}",
             remedy="vertex numbers run from 0 to the number of vertices less one",
         )
-    array.setflags(write=False)
+    return frozen(array.astype(np.int64))
+
+
+def _table(rows: ArrayLike, name: str) -> NDArray[np.integer | np.floating]:
+    """Return a copy as an array of numbers."""
+    try:
+        array = np.array(rows)
+    except ValueError as error:
+        raise InputError(f"{name} are rows of different lengths", remedy="give three numbers a row") from error
+    if array.dtype.kind not in "biuf":
+        raise InputError(f"{name} are of type {array.dtype}", remedy="give numbers")
     return array

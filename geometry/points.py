@@ -27,7 +27,7 @@ class SurfacePoints:
     Raises
     ------
     InputError
-        If shapes disagree, or the weights of a matched point do not sum to one within 1e-4.
+        If shapes disagree, or the weights of a matched point do not sum to one within 1e-4, or one is below -1e-4.
 
     Examples
     --------
@@ -53,6 +53,13 @@ class SurfacePoints:
                 row=int(wrong[0]) + 1,
                 remedy="write the three weights of the triangle's corners",
             )
+        outside = np.flatnonzero(weights.min(axis=1, initial=0.0) < -1e-4)
+        if len(outside):
+            raise InputError(
+                f"a barycentric weight is {weights[outside[0]].min():.6g}",
+                row=int(outside[0]) + 1,
+                remedy="give points inside their triangles",
+            )
         weights = np.clip(weights, 0.0, None)
         weights[matched] /= weights[matched].sum(axis=1, keepdims=True)
         numbers.setflags(write=False)
@@ -75,9 +82,14 @@ class SurfacePoints:
     def at_vertices(cls, mesh: Mesh, vertices: ArrayLike) -> SurfacePoints:
         """Return the points at the given vertex numbers (-1 for unmatched), each in its lowest-numbered face.
 
-        Raises `InputError` if a vertex lies in no face.
+        Raises `InputError` if a vertex lies in no face, or a number is not that of a vertex.
         """
         wanted = np.asarray(vertices, dtype=np.int64).reshape(-1)
+        if len(strange := wanted[wanted >= len(mesh.vertices)]):
+            raise InputError(
+                f"vertex {strange[0]} is not one of the {len(mesh.vertices)} of {mesh.name}",
+                remedy=f"vertex numbers run from 0 to {len(mesh.vertices) - 1}",
+            )
         corner = np.full(len(mesh.vertices), -1, dtype=np.int64)
         flat = mesh.faces.ravel()
         corner[flat[::-1]] = np.arange(flat.size)[::-1]

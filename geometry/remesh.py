@@ -14,12 +14,15 @@ from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.points import SurfacePoints
 
+OFF_TARGET = 0.1
+"""Share of the vertices asked for by which a collapsed mesh may have more or fewer."""
+
 BRICK = 16
 """Grid points along each side of the bricks in which a field is evaluated."""
 
 
 def closest_points(mesh: Mesh, positions: FloatArray) -> SurfacePoints:
-    """Return the (p,) points of the surface closest to (p, 3) positions in space.
+    """Return the (p,) points of the surface closest to (p, 3) positions in space; unmatched where one is not finite.
 
     Examples
     --------
@@ -27,7 +30,15 @@ def closest_points(mesh: Mesh, positions: FloatArray) -> SurfacePoints:
     >>> closest_points(triangle, np.array([[0.5, 0.25, 9.0]])).barycentric
     array([[0.25, 0.5 , 0.25]])
     """
-    place = np.ascontiguousarray(positions, dtype=np.float64)
+    given = np.asarray(positions, dtype=np.float64)
+    known = np.isfinite(given).all(axis=1)
+    if not known.all():
+        faces, weights = np.full(len(given), -1, dtype=np.int64), np.zeros((len(given), 3))
+        if known.any():
+            found = closest_points(mesh, given[known])
+            faces[known], weights[known] = found.faces, found.barycentric
+        return SurfacePoints(faces, weights)
+    place = np.ascontiguousarray(given)
     _, face, closest = igl.point_mesh_squared_distance(place, mesh.vertices, mesh.faces)
     corners = [np.ascontiguousarray(mesh.vertices[mesh.faces[face, c]]) for c in range(3)]
     weights = np.asarray(igl.barycentric_coordinates(np.ascontiguousarray(closest), *corners))
@@ -86,29 +97,46 @@ def isosurface(
 def decimate(mesh: Mesh, vertex_count: int) -> Mesh:
     """Collapse edges by quadric error until about `vertex_count` vertices are left.
 
-    Boundary loops and manifoldness stay. The vertex count is met up to a few: a collapse at a boundary takes one face
-    less.
+    Boundary loops and manifoldness stay; vertices in no face go. The vertex count is met up to a few, and up to
+    `OFF_TARGET` where there is a boundary: a collapse there takes one face only.
 
     Raises
     ------
     InputError
-        If the mesh has fewer vertices than asked for, fewer than four are asked for, or the mesh is not manifold, which
-        collapsing edges may never end with.
+        If the mesh has fewer vertices than asked for, fewer than four are asked for, or the count cannot be met; or the
+        mesh is not manifold, which collapsing edges may never end with.
 
     Source: Garland and Heckbert 1997, "Surface simplification using quadric error metrics".
     """
-    if not 4 <= vertex_count <= len(mesh.vertices):
+    in_use = len(np.unique(mesh.faces))
+    if not 4 <= vertex_count <= in_use:
         raise InputError(
-            f"{vertex_count} vertices asked of {mesh.name} with {len(mesh.vertices)}",
+            f"{vertex_count} vertices asked of {mesh.name} with {in_use}",
             remedy="ask for fewer, at least 4",
         )
-    pinched = len(igl.split_nonmanifold(np.ascontiguousarray(mesh.faces))[1]) - len(np.unique(mesh.faces))
+    pinched = len(igl.split_nonmanifold(np.ascontiguousarray(mesh.faces))[1]) - in_use
     if pinched:
         raise InputError(
             f"{mesh.name} is not manifold: {pinched} vertices join what only touches",
             remedy="repair it first, by nonrigid.geometry.clean.clean",
         )
-    # Each collapse takes one vertex and two faces.
-    face_count = len(mesh.faces) - 2 * (len(mesh.vertices) - vertex_count)
+    # Each collapse takes one vertex and two faces, or one face at a boundary.
+    fewest, most = max(1, len(mesh.faces) - 2 * (in_use - vertex_count)), len(mesh.faces)
+    small, face_count = _collapsed(mesh, fewest), fewest
+    while abs(len(small.vertices) - vertex_count) > OFF_TARGET * vertex_count and most - fewest > 1:
+        fewest, most = (face_count, most) if len(small.vertices) < vertex_count else (fewest, face_count)
+        face_count = (fewest + most) // 2
+        small = _collapsed(mesh, face_count)
+    if abs(len(small.vertices) - vertex_count) > OFF_TARGET * vertex_count:
+        raise InputError(
+            f"{mesh.name} cannot be brought from {in_use} to {vertex_count} vertices: it ends with"
+            f" {len(small.vertices)}",
+            remedy="ask for more; boundary loops stay",
+        )
+    return small
+
+
+def _collapsed(mesh: Mesh, face_count: int) -> Mesh:
+    """Collapse edges until at most so many faces are left."""
     vertices, faces, _, _ = igl.qslim(np.asfortranarray(mesh.vertices), np.asfortranarray(mesh.faces), face_count)
     return Mesh(np.ascontiguousarray(vertices), np.ascontiguousarray(faces), name=mesh.name)

@@ -68,13 +68,13 @@ def farthest_points(
         raise UnknownNameError("metric", metric, ("euclidean", "geodesic"))
     priority = canonical_priority(mesh)
     samples = np.empty(count, dtype=np.int64)
-    samples[0] = _farthest(_centroid_distances(mesh), priority) if start is None else start
+    samples[0] = farthest(_centroid_distances(mesh), priority) if start is None else start
     cover = np.full(n, np.inf)
     radius = np.inf
     for k in range(count - 1):
         np.minimum(cover, distances_from(int(samples[k]), radius), out=cover)
         cover[samples[k]] = -1.0  # below every distance: twin vertices at one place are each taken once
-        samples[k + 1] = _farthest(cover, priority)
+        samples[k + 1] = farthest(cover, priority)
         radius = cover[samples[k + 1]]
     return samples
 
@@ -100,7 +100,8 @@ def canonical_priority(mesh: Mesh) -> FloatArray:
     return np.asarray((mesh.vertices - centroid) @ (axes @ FUNCTIONAL) / (np.sqrt(mesh.area) or 1.0))
 
 
-def _farthest(distances: FloatArray, priority: FloatArray) -> int:
+def farthest(distances: FloatArray, priority: FloatArray) -> int:
+    """Return the number of the largest distance; of those within `TIE` of it, the one with the largest priority."""
     tied = np.flatnonzero(distances >= (1.0 - TIE) * distances.max())
     return int(tied[np.argmax(priority[tied])])
 

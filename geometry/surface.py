@@ -9,13 +9,14 @@ from typing import Any, Literal, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nonrigid.geometry.arrays import FloatArray, IntArray
+from nonrigid.geometry.arrays import FloatArray, IntArray, frozen
 from nonrigid.geometry.cache import Cache, content_hash, default_cache
 from nonrigid.geometry.clean import CleanMesh, clean
 from nonrigid.geometry.descriptors.heat_kernel import heat_kernel_signature, heat_times
 from nonrigid.geometry.descriptors.shot import shot
 from nonrigid.geometry.descriptors.wave_kernel import wave_energies, wave_kernel_signature
 from nonrigid.geometry.geodesics import Geodesics, make_geodesics
+from nonrigid.geometry.geodesics.protocol import checked_vertices
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.operators import Laplacian, laplacian
 from nonrigid.geometry.sampling import canonical_priority, farthest_points
@@ -98,6 +99,7 @@ class Surface:
 
         Where a symmetry of the surface leaves the sign of an eigenfunction open, `canonical_priority` decides it.
         """
+        k = int(k)
 
         def fresh() -> dict[str, FloatArray]:
             made = spectrum(self.laplacian(kind), k, reference=canonical_priority(self.mesh))
@@ -109,14 +111,14 @@ class Surface:
         """Return the (n, count) heat kernel signature at logarithmic times, from `k` eigenpairs."""
         basis = self.spectrum(k)
         return self._remember(
-            f"heat {count} {k}", lambda: _frozen(heat_kernel_signature(basis, heat_times(basis, count)))
+            f"heat {count} {k}", lambda: frozen(heat_kernel_signature(basis, heat_times(basis, count)))
         )
 
     def wave_kernel_signature(self, count: int = 100, k: int = 100) -> FloatArray:
         """Return the (n, count) wave kernel signature at logarithmic energies, from `k` eigenpairs."""
         basis = self.spectrum(k)
         return self._remember(
-            f"wave {count} {k}", lambda: _frozen(wave_kernel_signature(basis, *wave_energies(basis, count)))
+            f"wave {count} {k}", lambda: frozen(wave_kernel_signature(basis, *wave_energies(basis, count)))
         )
 
     def shot(
@@ -135,6 +137,7 @@ class Surface:
 
     def samples(self, count: int, metric: Literal["euclidean", "geodesic"] = "euclidean") -> IntArray:
         """Return `count` vertices far from one another; see `nonrigid.geometry.sampling.farthest_points`."""
+        count = int(count)
         key = ("samples", count, metric)
 
         def fresh() -> dict[str, IntArray]:
@@ -148,7 +151,7 @@ class Surface:
         `method` is "dijkstra", "bridged", "heat" or "exact"; see `nonrigid.geometry.geodesics`. Answers larger than
         `LARGEST_STORED` are not kept; what an earlier answer for more sources holds is taken from there.
         """
-        wanted, method = np.asarray(sources, dtype=np.int64).reshape(-1), self._same_as(method)
+        wanted, method = checked_vertices(sources, len(self.mesh.vertices)), self._same_as(method)
         ascending, place = np.unique(wanted, return_inverse=True)
         answers = self._rows.setdefault(method, [])
         if (earlier := _holding(ascending, answers)) is not None:
@@ -160,7 +163,7 @@ class Surface:
             return {"rows": self._geodesics(method).distances(ascending)}
 
         if ascending.size * len(self.mesh.vertices) * 8 > LARGEST_STORED:
-            large: FloatArray = _frozen(fresh()["rows"][place])
+            large: FloatArray = frozen(fresh()["rows"][place])
             return large
         rows: FloatArray = self._stored(key, fresh)["rows"]
         answers.append((ascending, rows))
@@ -173,7 +176,7 @@ class Surface:
         holds is taken from there. `keep=False` says that another run will hardly ask for these vertices: the answer is
         then kept in memory only.
         """
-        wanted, method = np.asarray(vertices, dtype=np.int64).reshape(-1), self._same_as(method)
+        wanted, method = checked_vertices(vertices, len(self.mesh.vertices)), self._same_as(method)
         ascending, place = np.unique(wanted, return_inverse=True)
         squares = self._squares.setdefault(method, [])
         if (earlier := _holding(ascending, squares)) is not None:
@@ -190,7 +193,7 @@ class Surface:
             made = self._geodesics(method)
             return {"square": np.vstack([made.distances(block)[:, ascending] for block in blocks])}
 
-        square: FloatArray = self._stored(key, fresh)["square"] if keep else _frozen(fresh()["square"])
+        square: FloatArray = self._stored(key, fresh)["square"] if keep else frozen(fresh()["square"])
         squares.append((ascending, square))
         return square if np.array_equal(wanted, ascending) else square[np.ix_(place, place)]
 
@@ -212,14 +215,9 @@ class Surface:
         return made
 
     def _stored(self, key: tuple[object, ...], compute: Callable[[], dict[str, Any]]) -> dict[str, Any]:
-        return {name: _frozen(array) for name, array in self._cache.fetch((self.key, *key), compute).items()}
+        return {name: frozen(array) for name, array in self._cache.fetch((self.key, *key), compute).items()}
 
 
 def _holding(ascending: IntArray, answers: Answers) -> tuple[IntArray, FloatArray] | None:
     """Return the first of earlier answers that is known for all the given vertices, if there is one."""
     return next((one for one in answers if np.isin(ascending, one[0], assume_unique=True).all()), None)
-
-
-def _frozen(array: Any) -> Any:
-    array.setflags(write=False)
-    return array

@@ -41,7 +41,14 @@ def read_mat(path: Path) -> tuple[FloatArray, IntArray]:
             file=path,
             remedy="save the mesh as one structure `surface`",
         )
-    x, y, z, triangles = (np.asarray(surfaces[0][field].item(), dtype=np.float64) for field in _FIELDS)
+    try:
+        x, y, z, triangles = (np.asarray(surfaces[0][field].item(), dtype=np.float64) for field in _FIELDS)
+    except (ValueError, TypeError) as error:
+        raise InputError(
+            f"the structure does not hold one table of numbers a field: {error}",
+            file=path,
+            remedy="save the mesh as one structure `surface` with full numeric arrays",
+        ) from error
     x, y, z = x.ravel(), y.ravel(), z.ravel()
     if not (x.shape == y.shape == z.shape and triangles.ndim == 2 and triangles.shape[1] == 3):
         raise InputError(

@@ -9,6 +9,7 @@ from multiprocessing.connection import Connection
 
 from nonrigid.formulations.model import Problem
 from nonrigid.geometry.arrays import FloatArray
+from nonrigid.solvers.acceptance import Bridge, Via
 from nonrigid.solvers.backend import Backend
 from nonrigid.solvers.confine import (
     child_context,
@@ -20,11 +21,12 @@ from nonrigid.solvers.confine import (
 from nonrigid.solvers.judge import Values, judge
 from nonrigid.solvers.layout import Layout
 from nonrigid.solvers.limits import Limits
-from nonrigid.solvers.once import solve_once
+from nonrigid.solvers.once import route_and_claim, solve_once
 from nonrigid.solvers.solution import Solution, TracePoint
 from nonrigid.solvers.status import Status
 
 _REPORT_EVERY = 0.1  # seconds between the points that the child hands over while it works
+_LONGEST_WAIT = 3600.0  # seconds; systems refuse to wait for ever by a number
 
 
 def run_isolated(problem: Problem, backend: Backend, start: Values, limits: Limits) -> Solution:
@@ -98,9 +100,11 @@ def _listen(pipe: Connection, deadline: float | None) -> _Heard:
     heard = _Heard()
     while True:
         left = None if deadline is None else deadline - time.perf_counter()
-        if (left is not None and left <= 0.0) or not pipe.poll(left):
+        if left is not None and left <= 0.0:
             heard.expired = True
             return heard
+        if not pipe.poll(None if left is None else min(left, _LONGEST_WAIT)):
+            continue
         try:
             message = pipe.recv()
         except (EOFError, OSError):
@@ -124,17 +128,19 @@ def _salvaged(
     seconds: float,
 ) -> Solution:
     best, trace = heard.best, heard.trace
+    route, claim = route_and_claim(backend, _bridges(backend, problem))
     solution = Solution(
         problem=problem.name,
         sense=problem.objective.sense,
         backend=backend.name,
         algorithm=backend.algorithm,
         status=status,
-        message=f"{words}; {status.advice}",
+        message=f"{words}; {status.advice}" if best is not None else f"{words}, before the first point",
         solve_seconds=seconds,
         evaluations=trace[-1].evaluations if trace else float("nan"),
         trace=tuple(trace),
-        route=(f"{backend.name}:{backend.algorithm}",),
+        route=route,
+        claim=claim.value,
         raw_status=words,
         versions=backend.versions(),
     )
@@ -148,3 +154,12 @@ def _salvaged(
         violation=judged.violation,
         stationarity=judged.stationarity,
     )
+
+
+def _bridges(backend: Backend, problem: Problem) -> tuple[Bridge, ...]:
+    """Return the bridges that the lost child took; none where a third party's answer fails."""
+    try:
+        accepted = backend.accepts(problem)
+    except Exception:
+        return ()
+    return accepted.bridges if isinstance(accepted, Via) else ()

@@ -94,7 +94,8 @@ def match(
     Raises
     ------
     InputError
-        If the mapping names a stage that the formulation never stated, or the formulation has no `stages`.
+        If the mapping names a stage that the formulation never stated, the formulation has no `stages`, or these end
+        without a `Correspondence`.
     UnknownNameError
         If a backend does not exist.
     """
@@ -114,12 +115,17 @@ def match(
             solution = solve(problem, chosen, starts=starts, seed=seed, limits=limits)
             working += time.perf_counter() - before
             solutions.append(solution)
-            if not solution.status.usable:
+            if not solution.usable:
                 stages.close()
                 break
             problem = stages.send(solution)
     except StopIteration as end:
         correspondence = end.value
+        if not isinstance(correspondence, Correspondence):
+            raise InputError(
+                f"stages of {type(formulation).__name__} ended with {correspondence!r}",
+                remedy="return a Correspondence from it",
+            ) from None
     stated = {solution.problem for solution in solutions}
     if correspondence is not None and (unknown := sorted(set(choices) - stated)):
         raise InputError(f"no stage is called {unknown[0]!r}", remedy=f"the stages were {sorted(stated)}")

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
 from nonrigid.formulations.model import Problem, Sense
 from nonrigid.formulations.model.binary_sets import integral_entries
 from nonrigid.geometry.arrays import FloatArray
-from nonrigid.solvers.acceptance import Claim, Refused, Rewritten, Via
+from nonrigid.solvers.acceptance import Bridge, Claim, Refused, Rewritten, Via
 from nonrigid.solvers.backend import Backend, Raw
 from nonrigid.solvers.judge import Judgement, Values, judge
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.oracle import LimitReached, NotFiniteError, Oracle
-from nonrigid.solvers.solution import Bound, Solution, TracePoint
+from nonrigid.solvers.solution import Solution, TracePoint
 from nonrigid.solvers.status import Status
 
 Report = Callable[[FloatArray, TracePoint], None]
@@ -46,8 +45,8 @@ def solve_once(
     seconds, evaluations = oracle.seconds, oracle.evaluations
     judged, error = _measured(problem, rewritten, oracle, raw)
     # A failing term is the cause, what the library then says of it the consequence.
-    status, message = _decide(problem, judged, limits, oracle, oracle.failure or failure or error)
-    claims = [bridge.claim for bridge in bridges if bridge.claim is not Claim.EXACT]
+    status, message = _decide(problem, judged, limits, oracle, oracle.failure or failure or error, seconds)
+    route, claim = route_and_claim(backend, bridges)
     solution = head.solution(
         status,
         message,
@@ -59,21 +58,20 @@ def solve_once(
         solve_seconds=seconds,
         evaluations=evaluations,
         trace=tuple(oracle.trace),
-        route=(*(bridge.name for bridge in bridges), f"{backend.name}:{backend.algorithm}"),
-        claim=(claims[0] if claims else Claim.EXACT).value,
+        route=route,
+        claim=claim.value,
         raw_status=raw.raw_status if failure is None else _words(failure),
         versions=backend.versions(),
     )
-    survives = not any(claim in (Claim.LOCAL, Claim.RESTRICTION) for claim in claims)
-    return _bounded(solution, raw.bound) if raw.bound is not None and survives else solution
+    survives = not any(bridge.claim in (Claim.LOCAL, Claim.RESTRICTION) for bridge in bridges)
+    return solution.with_bound(raw.bound) if raw.bound is not None and survives else solution
 
 
-def _bounded(solution: Solution, bound: Bound) -> Solution:
-    """Return the solution with the bound of its backend, unless the solution itself refutes it."""
-    held = solution.with_bound(bound)
-    if held.gap is not None and held.gap < -1e-9 * max(1.0, abs(solution.objective)):
-        return replace(solution, message=f"{solution.message}; the bound {bound.value:.9g} ({bound.method}) is refuted")
-    return held
+def route_and_claim(backend: Backend, bridges: tuple[Bridge, ...]) -> tuple[tuple[str, ...], Claim]:
+    """Return the names of the bridges and of the backend, and what the bridges leave of an answer's claim."""
+    claims = [bridge.claim for bridge in bridges if bridge.claim is not Claim.EXACT]
+    names = (*(bridge.name for bridge in bridges), f"{backend.name}:{backend.algorithm}")
+    return names, claims[0] if claims else Claim.EXACT
 
 
 class _Head:
@@ -94,11 +92,11 @@ class _Head:
         )
 
 
-def _rewrite(problem: Problem, bridges: tuple[object, ...]) -> Rewritten:
+def _rewrite(problem: Problem, bridges: tuple[Bridge, ...]) -> Rewritten:
     steps = []
     current = problem
     for bridge in bridges:
-        step: Rewritten = bridge.apply(current)  # type: ignore[attr-defined]
+        step = bridge.apply(current)
         steps.append(step)
         current = step.problem
 
@@ -166,14 +164,21 @@ def _returned(x: FloatArray | None, oracle: Oracle, rewritten: Rewritten) -> Val
 
 
 def _decide(
-    problem: Problem, judged: Judgement | None, limits: Limits, oracle: Oracle, failure: Exception | None
+    problem: Problem,
+    judged: Judgement | None,
+    limits: Limits,
+    oracle: Oracle,
+    failure: Exception | None,
+    seconds: float,
 ) -> tuple[Status, str]:
     stop = oracle.interrupted
+    if stop is None and limits.seconds is not None and seconds >= limits.seconds:
+        stop = LimitReached(f"{limits.seconds:g} s are spent")  # by the library's own clock, which says so in its words
     if judged is None:
         if isinstance(stop, NotFiniteError):
             return Status.NUMERICAL_ERROR, f"{stop}; {Status.NUMERICAL_ERROR.advice}"
         if isinstance(stop, LimitReached):
-            return Status.LIMIT, f"{stop} before the first point; {Status.LIMIT.advice}"
+            return Status.LIMIT, f"{stop} before the first point; raise the limit, or choose a faster backend"
         words = "no point was returned" if failure is None else _words(failure)
         return Status.BACKEND_ERROR, f"{words}; {Status.BACKEND_ERROR.advice}"
     if judged.violation > limits.feasibility:

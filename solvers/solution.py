@@ -9,6 +9,9 @@ from nonrigid.formulations.model import Sense
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.status import Status
 
+ROUNDING = 1e-9
+"""Part of max(1, |objective|) by which an objective may exceed a valid bound."""
+
 
 @dataclass(frozen=True)
 class TracePoint:
@@ -92,6 +95,11 @@ class Solution:
         return self.values[name]
 
     @property
+    def usable(self) -> bool:
+        """Whether there is a point, and it lies in its sets: a solve may spend its limit before the first."""
+        return self.status.usable and bool(self.values)
+
+    @property
     def gap(self) -> float | None:
         """Distance between the objective and its bound, never negative beyond rounding; None without a bound."""
         if self.bound is None:
@@ -110,10 +118,18 @@ class Solution:
         return f"{self.backend}:{self.algorithm}"
 
     def with_bound(self, bound: Bound, tolerance: float = 1e-6) -> Solution:
-        """Return the solution with a bound; certified if the gap is at most tolerance * max(1, |objective|)."""
+        """Return the solution with a bound; certified if the gap is at most tolerance * max(1, |objective|).
+
+        A bound that the solution itself exceeds by more than rounding proves nothing, and the message says so.
+        """
         held = replace(self, bound=bound)
-        gap = held.gap
-        if self.status.usable and gap is not None and gap <= tolerance * max(1.0, abs(self.objective)):
+        gap, unit = held.gap, max(1.0, abs(self.objective))
+        if not self.usable or gap is None:
+            return held
+        if gap < -ROUNDING * unit:
+            refuted = f"the bound {bound.value:.9g} ({bound.method}) is refuted"
+            return replace(held, message=f"{self.message}; {refuted}")
+        if gap <= tolerance * unit:
             return replace(held, status=Status.CERTIFIED, message=f"{bound.method} proves a gap of {gap:.2g}")
         return held
 

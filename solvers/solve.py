@@ -52,7 +52,7 @@ def solve(
     UnknownNameError
         If a backend or algorithm does not exist. A backend that cannot take the problem gives a refused `Solution`.
     InputError
-        If a start has the wrong names or shapes, or entries that are not finite.
+        If a start has the wrong names or shapes, or entries that are not finite; or `starts` or `seed` is too small.
 
     Examples
     --------
@@ -69,6 +69,8 @@ def solve(
         raise InputError("the chain of backends is empty", remedy="name at least one, such as 'native'")
     if starts < 1:
         raise InputError(f"starts is {starts}", remedy="ask for at least one start")
+    if seed < 0:
+        raise InputError(f"seed is {seed}", remedy="give a number of at least 0")
     backends = [resolved(make_backend(spec), problem) for spec in chain]
     answers: list[Solution] = []
     for chosen in backends:
@@ -115,7 +117,7 @@ def _starts(problem: Problem, start: Values | Solution | None, count: int, seed:
 def _merit(answer: Solution) -> tuple[bool, float]:
     sign = 1.0 if answer.sense is Sense.MAXIMIZE else -1.0
     worth = sign * answer.objective
-    return answer.status.usable and bool(answer.values), worth if np.isfinite(worth) else -np.inf
+    return answer.usable, worth if np.isfinite(worth) else -np.inf
 
 
 def _as_attempt(answer: Solution) -> Attempt:

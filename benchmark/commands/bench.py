@@ -12,7 +12,7 @@ from nonrigid.benchmark.commands.summary import show_summary
 from nonrigid.benchmark.estimate import Estimate, estimate
 from nonrigid.benchmark.executors import make_executor
 from nonrigid.benchmark.plan import Plan, read_plan
-from nonrigid.benchmark.report.table import summary
+from nonrigid.benchmark.report.table import refusal_words, refusals, summary
 from nonrigid.benchmark.runner import run_plan
 from nonrigid.benchmark.terminal import say, show_json, show_table
 from nonrigid.geometry.errors import InputError
@@ -56,6 +56,8 @@ def bench_command(
         show_json(rows)
         return
     show_summary(f"{read.title}, on {read.dataset.name}", rows)
+    for row in refusals(records):
+        say(refusal_words(row))
     say(f"{len(records)} runs in {out}; `nonrigid report {out}` writes tables and figures")
 
 

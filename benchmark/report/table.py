@@ -166,10 +166,13 @@ def notes(index: Mapping[str, object], records: Sequence[Record]) -> list[str]:
     if (sources := len({record["source"] for record in records})) > 1:
         found.append(f"The runs were made by {sources} states of the code; `nonrigid bench --fresh` repeats them all.")
     for row in refusals(records):
-        found.append(
-            f"{row['backend']}: {row['runs']} without a match ({row['status']}), such as {row['pair']}: {row['reason']}"
-        )
+        found.append(refusal_words(row))
     return found
+
+
+def refusal_words(row: Mapping[str, object]) -> str:
+    """Return a row of `refusals` as a sentence."""
+    return f"{row['backend']}: {row['runs']} without a match ({row['status']}), such as {row['pair']}: {row['reason']}"
 
 
 def _row(label: str, backend: object, split: str, records: Sequence[Record]) -> dict[str, object]:

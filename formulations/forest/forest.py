@@ -46,7 +46,10 @@ class Forest:
 
     def __repr__(self) -> str:
         # A benchmark's runs are told apart by it, so that it has to follow the content.
-        content = [array for tree in self.trees for array in (tree.tests.times, tree.threshold, tree.votes.data)]
+        content: list[object] = [self.template.digest]
+        for tree in self.trees:
+            content += [tree.tests.cutoffs, tree.tests.times, tree.test, tree.threshold, tree.left, tree.right]
+            content += [tree.votes.data, tree.votes.indices, tree.votes.indptr]
         poses = " ".join(self.poses)
         return f"Forest({self.class_name!r}, {len(self.trees)} trees, poses {poses}, {content_hash(*content)[:16]})"
 

@@ -104,7 +104,8 @@ def train_forest(
     class_name
         Kept with the forest.
     seed
-        Same seed, same machine, same forest; neither the order of the examples nor that of vertices counts.
+        Same seed, same machine, same forest; neither the order of the examples nor, where their parts have different
+        names, that of vertices counts.
 
     Raises
     ------
@@ -122,7 +123,7 @@ def train_forest(
                 remedy="train one forest for each full surface",
             )
     rng = np.random.default_rng(seed)
-    ordered = sorted(examples, key=lambda example: example.pair.part.raw.name)
+    ordered = sorted(examples, key=lambda example: (example.pair.part.raw.name, example.pair.part.key))
     count = min(settings.eigenfunctions, len(full.mesh.vertices) - 1)
     template = Template.of(full, settings.labels)
     coarse = full.samples(min(settings.cells, len(full.mesh.vertices)))

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from nonrigid.formulations.model.gauge_sets import Simplex
 from nonrigid.formulations.model.sets import SmoothConstraint
 from nonrigid.formulations.model.term import ModelError
+from nonrigid.formulations.model.transport_sets import PartialTransport
 from nonrigid.geometry.arrays import FloatArray, IntArray
 
 
@@ -38,15 +38,8 @@ class Assignment:
         return max(float(np.max(part, initial=0.0)) for part in (-x, rows, columns))
 
     def restore(self, x: FloatArray) -> FloatArray:
-        """Project each row onto the simplex, then blend with the uniform matrix until no column exceeds 1."""
-        if self.violation(x) <= 1e-14:
-            return x.copy()
-        rows = np.array([Simplex().project(row) for row in x])
-        fullest, share = float(rows.sum(axis=0).max()), x.shape[0] / x.shape[1]
-        if fullest <= 1.0:
-            return rows
-        kept = (1.0 - share) / (fullest - share)
-        return np.asarray(kept * rows + (1.0 - kept) / x.shape[1])
+        """Scale rows and columns down to 1, then move what is missing into what is free; see `PartialTransport`."""
+        return PartialTransport(np.ones(x.shape[0]), np.ones(x.shape[1])).restore(x)
 
     def linear_max(self, g: FloatArray) -> FloatArray:
         """Return the injective map with the largest sum of g, by shortest augmenting paths."""
@@ -122,8 +115,8 @@ class PartialPermutation:
         return max(float(np.max(fraction, initial=0.0)), Assignment().violation(x))
 
     def restore(self, x: FloatArray) -> FloatArray:
-        """Return the nearest injective map: the one with the largest sum of x."""
-        return self.linear_max(x)
+        """Return the nearest injective map: the one with the largest sum of x, what is no number counted as 0."""
+        return self.linear_max(np.nan_to_num(x, nan=0.0, posinf=1.0, neginf=0.0))
 
     project = restore
 
@@ -167,6 +160,11 @@ def cheapest_assignment(cost: FloatArray) -> tuple[IntArray, FloatArray]:
     bound of every assignment's cost, and equals that of the one returned. Rows are added one by one along shortest
     augmenting paths, O(k^2 n).
 
+    Raises
+    ------
+    ModelError
+        If a cost is not finite, or there are more rows than columns.
+
     Source: Jonker and Volgenant, a shortest augmenting path algorithm for linear assignment problems (Computing 1987).
 
     Examples
@@ -176,6 +174,8 @@ def cheapest_assignment(cost: FloatArray) -> tuple[IntArray, FloatArray]:
     (array([1, 0]), array([-1.,  0.,  0.]))
     """
     k, n = _checked(cost.shape)
+    if not np.isfinite(cost).all():
+        raise ModelError("a cost of an assignment is not finite; give forbidden pairs a large cost")
     row_of = np.full(n, -1)
     row_price, price = np.zeros(k), np.zeros(n)
     for added in range(k):

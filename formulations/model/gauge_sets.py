@@ -112,8 +112,10 @@ class ElasticNet:
         # The root of a quadratic, in the form that loses no digits as mix -> 0 (there it is (s - 1) / count).
         excess = (linear * s + self.mix * q - 1.0) / (4.0 * self.mix + count * linear**2)
         multiplier = 2.0 * excess / (1.0 + np.sqrt(np.maximum(1.0 + 4.0 * self.mix * excess, 0.0)))
-        support = int(np.flatnonzero(positive > multiplier * linear)[-1])
-        return self.restore(np.maximum(x - multiplier[support] * linear, 0.0))
+        within = np.flatnonzero(positive > multiplier * linear)
+        if not len(within):  # so far outside that 1 is below rounding
+            return self.linear_max(x)
+        return self.restore(np.maximum(x - multiplier[within[-1]] * linear, 0.0))
 
     def lower(self, x: Any, ops: Any) -> list[Any]:
         """Write the surface as constraints; not convex unless mix = 0."""

@@ -36,7 +36,7 @@ class Objective:
 
     def value_and_gradient(self, values: Mapping[str, FloatArray]) -> tuple[float, dict[str, FloatArray]]:
         """Return the objective in the user's own sense, and its gradient by variable name."""
-        total, gradient = self.constant, {name: np.zeros_like(value) for name, value in values.items()}
+        total, gradient = self.constant, {name: np.zeros(np.shape(value)) for name, value in values.items()}
         for term in self.terms:
             value, parts = term.value_and_gradient(values)
             total += value
@@ -120,7 +120,7 @@ class Problem:
         used = {variable.name for term in objective.terms for variable in term.variables}
         used |= {variable.name for variable, _ in self.constraints.values()}
         if missing := sorted(used - set(names)):
-            raise ModelError(f"problem {name!r} uses {missing} but puts them in no set; add `{missing[0]} @ Free()`")
+            raise ModelError(f"problem {name!r} uses {missing} but puts them in no set; add `{missing[0]} @ free()`")
         shapes = {variable.name: variable.shape for variable in self.variables}
         for key, value in self.start.items():
             if shapes.get(key) != np.shape(value) or not np.isfinite(value).all():

@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.geodesics.dijkstra import DijkstraGeodesics, surface_segments, symmetric_graph
 from nonrigid.geometry.mesh import Mesh
+from nonrigid.geometry.sampling import canonical_priority, farthest
 
 BULGE = 1.15
 """Length of a way over a missing patch, in units of the straight line across: patches of bodies are curved."""
@@ -52,21 +53,25 @@ class BridgedGeodesics(DijkstraGeodesics):
 def _bridges(mesh: Mesh) -> tuple[IntArray, FloatArray]:
     """Return the (b, 2) ends of the bridges, and their (b,) lengths."""
     pairs = [np.empty((0, 2), dtype=np.int64)]
+    priority = canonical_priority(mesh)
     for loop in mesh.boundary_loops:
-        kept = _spread(mesh.vertices[loop])
+        kept = _spread(mesh.vertices[loop], priority[loop])
         i, j = np.triu_indices(len(kept), 1)
         pairs.append(np.sort(np.stack([loop[kept[i]], loop[kept[j]]], axis=1), axis=1))
     ends = np.vstack(pairs)
     return ends, BULGE * np.linalg.norm(mesh.vertices[ends[:, 0]] - mesh.vertices[ends[:, 1]], axis=1)
 
 
-def _spread(places: FloatArray) -> IntArray:
-    """Return the numbers of at most `ENDS` points far from one another, begun with the one farthest from the mean."""
+def _spread(places: FloatArray, priority: FloatArray) -> IntArray:
+    """Return the numbers of at most `ENDS` points far from one another, begun with the one farthest from the mean.
+
+    Priorities decide between points that are equally far: those of a round hole all are.
+    """
     if len(places) <= ENDS:
         return np.arange(len(places))
-    chosen = [int(np.linalg.norm(places - places.mean(axis=0), axis=1).argmax())]
+    chosen = [farthest(np.linalg.norm(places - places.mean(axis=0), axis=1), priority)]
     nearest = np.full(len(places), np.inf)
     while len(chosen) < ENDS:
         nearest = np.minimum(nearest, np.linalg.norm(places - places[chosen[-1]], axis=1))
-        chosen.append(int(nearest.argmax()))
+        chosen.append(farthest(nearest, priority))
     return np.array(chosen)

@@ -11,6 +11,7 @@ import potpourri3d
 from numpy.typing import ArrayLike
 
 from nonrigid.geometry.arrays import FloatArray
+from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.geodesics.protocol import checked_vertices
 from nonrigid.geometry.mesh import Mesh
 
@@ -47,6 +48,12 @@ class HeatGeodesics:
 
     @cached_property
     def _solver(self) -> Any:
+        unused = len(self.mesh.vertices) - len(np.unique(self.mesh.faces))
+        if unused:
+            raise InputError(
+                f"{self.mesh.name} cannot be measured by the method 'heat': {unused} vertices are in no triangle",
+                remedy="clean the mesh first (nonrigid.geometry.clean), or use the method 'dijkstra'",
+            )
         return potpourri3d.MeshHeatMethodDistanceSolver(
             np.array(self.mesh.vertices), np.array(self.mesh.faces), use_robust=True
         )

@@ -31,7 +31,7 @@ def check_manifold(mesh: Mesh, method: str) -> None:
         if count:
             raise InputError(
                 f"{mesh.name} cannot be measured by the method {method!r}: {count} {fault}",
-                remedy="clean the mesh first (nonrigid.geometry.clean), or use the method 'dijkstra'",
+                remedy="use the method 'dijkstra', or nonrigid.geometry.clean, which mends all but flat triangles",
             )
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import shutil
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -195,3 +197,25 @@ def test_the_installed_command_behaves_alike(tmp_path: Path) -> None:
     assert answer.returncode == 2
     assert answer.stderr == "nonrigid: a.off: there is no such file; check the path\n"
     assert answer.stdout == ""
+
+
+def test_an_interrupted_benchmark_says_what_is_kept(tmp_path: Path) -> None:
+    code = "from nonrigid.benchmark.cli import main; main()"
+    words = [sys.executable, "-c", code, "bench", "demo", "--out", "results"]
+    child = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
+    deadline = time.monotonic() + 60.0
+    while not (tmp_path / "results" / "index.json").exists() and time.monotonic() < deadline:
+        time.sleep(0.05)
+    child.send_signal(signal.SIGINT)
+    heard = child.communicate(timeout=60)[1]
+    assert child.returncode == 130
+    assert heard.splitlines()[-1] == "nonrigid: interrupted; finished runs are kept"
+
+
+def test_a_benchmark_says_why_runs_have_no_match(tmp_path: Path, nonrigid: Command) -> None:
+    (tmp_path / "p.toml").write_text(
+        'backends = ["native"]\n[data]\ndataset = "creatures"\nvertices = 600\nnames = ["cuts_cat_shape_1"]\n'
+        '[[methods]]\nmethod = "gt"\nsettings = { part_samples = 0 }\n'
+    )
+    answer = nonrigid("bench", str(tmp_path / "p.toml"), "--out", str(tmp_path / "out"), "--quiet")
+    assert "native: 1 without a match (error), such as cuts_cat_shape_1: part_samples is 0" in answer.out

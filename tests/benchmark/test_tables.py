@@ -130,3 +130,15 @@ def test_conflicts_are_named(tmp_path: Path) -> None:
     shutil.copytree(one, tmp_path / "out")
     with pytest.raises(InputError, match="holds results already"):
         merge_results([one], tmp_path / "out")
+
+
+def test_other_data_and_other_settings_under_one_label_are_not_mixed(tmp_path: Path) -> None:
+    one = folder(tmp_path / "1", [record("x", settings="GT(20)")], data="creatures 800")
+    other = folder(tmp_path / "2", [record("y", settings="GT(20)")], data="creatures 2500")
+    with pytest.raises(InputError, match=r"its data is creatures 2500, that of .* creatures 800"):
+        merge_results([one, other], tmp_path / "out")
+    twin = folder(tmp_path / "3", [record("z", settings="GT(80)")], data="creatures 800")
+    with pytest.raises(InputError, match=r"'gt' with native on p has other settings than in .*1; give each its own"):
+        merge_results([one, twin], tmp_path / "out")
+    seeds = folder(tmp_path / "4", [record("s", settings="GT(20)", seed=1)], data="creatures 800")
+    assert len(merge_results([one, seeds], tmp_path / "out")) == 2

@@ -15,8 +15,9 @@ import pytest
 
 from nonrigid.formulations.model import Problem
 from nonrigid.geometry.arrays import FloatArray
-from nonrigid.solvers.acceptance import Acceptance, Native, Refused
+from nonrigid.solvers.acceptance import Acceptance, Native, Refused, via
 from nonrigid.solvers.backend import Raw
+from nonrigid.solvers.bridges.radial import Radial
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.oracle import Oracle
 from nonrigid.solvers.solution import Solution
@@ -248,3 +249,41 @@ def test_a_chain_falls_back_and_records_every_attempt() -> None:
     answer = solve(convex_quadratic().problem, [lost, sound, lost])
     assert [attempt.status for attempt in answer.attempts] == [Status.BACKEND_ERROR, Status.STATIONARY]
     assert answer.objective == pytest.approx(convex_quadratic().optimum)
+
+
+@dataclass(frozen=True)
+class OwnClock(Honest):
+    def run(self, oracle: Oracle, start: FloatArray, limits: Limits) -> Raw:
+        gradient = oracle.value_and_gradient(start)[1]
+        time.sleep(1.1 * (limits.seconds or 0.0))
+        return Raw(start - 1e-3 * gradient, "user_limit")
+
+
+def test_time_spent_by_the_clock_of_the_library_is_a_limit() -> None:
+    answer = solve(convex_quadratic().problem, OwnClock(), start=START, limits=Limits(seconds=0.2))
+    assert answer.status is Status.LIMIT
+    assert answer.usable
+
+
+@pytest.mark.parametrize("seconds", [float("inf"), 3e9])
+def test_a_limit_beyond_what_systems_can_wait_for_is_no_fault(seconds: float) -> None:
+    answer = solve(convex_quadratic().problem, Honest(), start=START, limits=Limits(hard_seconds=seconds))
+    assert answer.status is Status.STATIONARY
+
+
+@dataclass(frozen=True)
+class HangingBehindABridge(Honest):
+    def accepts(self, problem: Problem) -> Acceptance:
+        return via(problem, Radial())
+
+    def run(self, oracle: Oracle, start: FloatArray, limits: Limits) -> Raw:
+        time.sleep(60.0)
+        raise AssertionError
+
+
+def test_a_killed_solve_keeps_its_route_and_claim() -> None:
+    answer = solve(planted_game().problem, HangingBehindABridge(), limits=QUICK)
+    assert answer.status is Status.LIMIT
+    assert answer.route == ("radial", "broken:descent")
+    assert not answer.usable
+    assert "before the first point" in answer.message

@@ -250,7 +250,7 @@ def test_matches_can_be_kept_to_vertices_and_the_slow_growth_be_left_out(creatur
     "settings", [{"steps": 0}, {"starts": 7}, {"last_steps": -1}, {"leash": -0.1}, {"rigid_reach": 0.0}]
 )
 def test_numbers_out_of_range_are_refused(creature: PairData, settings: dict[str, int]) -> None:
-    with pytest.raises(InputError, match=f"{next(iter(settings))} is .*give a number from"):
+    with pytest.raises(InputError, match=f"{next(iter(settings))} is .*give a number "):
         match(Pair.of(creature.part, creature.full), replace(SMALL, **settings))  # type: ignore[arg-type]
 
 

@@ -6,14 +6,20 @@ import numpy as np
 import pytest
 
 from nonrigid.benchmark.datasets.creatures import Creatures
+from nonrigid.benchmark.methods import make_method
 from nonrigid.formulations.candidates import Candidates, candidate_matches
 from nonrigid.formulations.distortion import consistency, distortion
 from nonrigid.formulations.formulation import Correspondence, Pair
+from nonrigid.formulations.game_theoretic import GameTheoretic
 from nonrigid.formulations.localisation import local_matches, multilateration_cost
+from nonrigid.formulations.trusted_descriptors import trusted_descriptors
 from nonrigid.geometry.errors import InputError, UnknownNameError
+from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.points import SurfacePoints
+from nonrigid.solvers.match import match
 
 RADII = (0.10,)
+SQUARE = Mesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
 
 
 @pytest.fixture(scope="module")
@@ -120,3 +126,65 @@ def test_a_correspondence_matches_a_vertex_once() -> None:
         Correspondence(np.array([3, 3]), points, np.ones(2))
     with pytest.raises(InputError, match="lengths"):
         Correspondence(np.array([3]), points, np.ones(2))
+
+
+def test_vertices_with_hardly_a_neighbour_are_no_ground_for_candidates() -> None:
+    creature = next(spec for spec in Creatures(vertices=600).pairs() if spec.split == "cuts").load()
+    pair = Pair.of(creature.part, creature.full, cache=None)
+    with pytest.raises(InputError, match=r"\d+% of the vertices of .* within 0.02 sqrt.*larger radii, or a finer mesh"):
+        candidate_matches(pair, radii=(0.02,))
+    with pytest.raises(InputError, match="radii is empty"):
+        candidate_matches(pair, radii=())
+    with pytest.raises(InputError, match=r"within 0\.02 sqrt"):
+        trusted_descriptors(pair, (0.02,), power=1.0)
+
+
+def test_a_part_in_another_unit_of_length_is_refused() -> None:
+    with pytest.raises(InputError, match=r"1e-06 times the area .* the same unit of length"):
+        Pair.of(SQUARE.transformed(scale=1e-3), SQUARE, cache=None)
+
+
+@pytest.mark.parametrize(
+    ("part", "full", "words"),
+    [
+        ([-1], [0], "part vertex -1 is not one"),
+        ([0], [99], "full vertex 99 is not one"),
+        ([0, 1], [0], "2 vertices of the part, 1 of the full surface, 2 confidences"),
+        ([0.5], [0], "give a flat list of integers"),
+    ],
+)
+def test_matches_of_what_is_no_vertex_are_refused(part: list[int], full: list[int], words: str) -> None:
+    pair = Pair.of(SQUARE, SQUARE, cache=None)
+    with pytest.raises(InputError, match=words):
+        Correspondence.between_vertices(pair, part, full)
+    found = Correspondence.between_vertices(pair, [3], [0])
+    with pytest.raises(InputError, match="part vertex 3 is not one of the 2"):
+        found.dense(2)
+
+
+@pytest.mark.parametrize(
+    ("method", "setting"),
+    [
+        ("gt", {"groups": 0}), ("gt", {"local_candidates": -1}), ("gt", {"local_reach": -1.0}),
+        ("gt", {"radii": (-1.0,)}),
+        ("gt", {"kernel_width": 0.0}), ("gt", {"excess_weight": 2.0}),
+        ("en", {"floor": 1.0}), ("en", {"mix": 1.5}), ("en", {"part_samples": 0}),
+        ("anchored", {"floor": 1.0}), ("anchored", {"kept": 1.5}), ("anchored", {"per_sample": 0}),
+        ("anchored", {"part_samples": 0}), ("anchored", {"reach": 0.0}), ("anchored", {"local_reach": float("nan")}),
+        ("anchored", {"growing_weight": -1.0}),
+        ("pfm", {"closest_point_iterations": -1}), ("pfm", {"rounds": 0}), ("pfm", {"area_weight": -1.0}),
+        ("zoomout", {"first_size": 1}), ("zoomout", {"components": 0}), ("pgw", {"part_samples": 0}),
+        ("im", {"kept": 0.0}), ("im", {"per_sample": 0}),
+    ],
+)  # fmt: skip
+def test_settings_out_of_range_are_refused_before_any_work(method: str, setting: dict[str, object]) -> None:
+    formulation = make_method(method, setting)
+    with pytest.raises(InputError, match=f"{next(iter(setting))} is .*give .*number"):
+        match(Pair.of(SQUARE, SQUARE, cache=None), formulation)
+
+
+def test_one_candidate_is_no_game() -> None:
+    creature = next(spec for spec in Creatures(vertices=600).pairs() if spec.split == "cuts").load()
+    pair = Pair.of(creature.part, creature.full, cache=None)
+    with pytest.raises(InputError, match="1 candidate matches are no game"):
+        match(pair, GameTheoretic(part_samples=1, per_sample=1))

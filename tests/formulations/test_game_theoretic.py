@@ -91,5 +91,5 @@ def test_survivors_and_their_rivals_leave_the_game() -> None:
 
 def test_no_group_is_no_answer() -> None:
     full = Creatures(vertices=600).pairs()[0].load().full
-    with pytest.raises(InputError, match="at least one group"):
+    with pytest.raises(InputError, match="groups is 0; give a number of at least 1"):
         match(Pair.of(full, full, cache=None), GameTheoretic(groups=0))

@@ -30,6 +30,7 @@ from nonrigid.formulations.model import (
     minimize,
     nonnegative,
 )
+from nonrigid.formulations.model.assignment_sets import Assignment, PartialPermutation, cheapest_assignment
 from nonrigid.formulations.model.ops import NumpyOps
 from nonrigid.geometry.arrays import FloatArray
 
@@ -172,7 +173,7 @@ def test_the_curvature_of_a_problem_follows_from_its_terms(kinds: Any, sense: An
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        (lambda: Problem("p", minimize(SQUARES(v))), "puts them in no set; add `v @ Free"),
+        (lambda: Problem("p", minimize(SQUARES(v))), "puts them in no set; add `v @ free"),
         (lambda: Problem("p", minimize(SQUARES(v)), v @ free(), v @ Simplex()), "puts a variable into two sets"),
         (lambda: JOINT.fix(w=np.ones(3)), "has no variable 'w'; it has"),
         (lambda: JOINT.fix(C=W, v=np.ones(3)), "leaves nothing to solve"),
@@ -224,3 +225,24 @@ def test_numpy_operations_are_the_plain_ones() -> None:
     np.testing.assert_array_equal(ops.matmul(np.ones((2, 2)), x), [-1.0, -1.0])
     np.testing.assert_array_equal(ops.equal(x, 1.0), [0.0, 3.0])
     np.testing.assert_array_equal(ops.at_most(x, -1.0), [2.0, 0.0])
+
+
+def test_an_assignment_is_restored_near_where_it_was() -> None:
+    rng = np.random.default_rng(0)
+    for shape in ((3, 3), (3, 5), (10, 10), (40, 41)):
+        near = Assignment().sample(shape, rng) + 1e-8 * rng.standard_normal(shape)
+        found = Assignment().restore(near)
+        assert Assignment().violation(found) <= 1e-12
+        assert np.abs(found - near).max() <= 1e-6
+    np.testing.assert_allclose(Assignment().restore(np.eye(3) + 1e-10 * np.eye(3, k=1)), np.eye(3), atol=1e-9)
+
+
+def test_costs_that_are_not_finite_are_refused_and_such_points_restored() -> None:
+    with pytest.raises(ModelError, match="a cost of an assignment is not finite"):
+        cheapest_assignment(np.array([[np.inf, 1.0], [1.0, 2.0]]))
+    found = PartialPermutation().restore(np.array([[np.nan, 1.0], [np.inf, -np.inf]]))
+    assert found.tolist() == [[0.0, 1.0], [1.0, 0.0]]
+
+
+def test_a_point_far_outside_is_projected_onto_the_simplex() -> None:
+    assert Simplex().project(np.array([1e17, 0.0])).tolist() == [1.0, 0.0]

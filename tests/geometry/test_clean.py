@@ -180,3 +180,10 @@ def test_defective_real_meshes_come_out_sound(data: Path, name: str) -> None:
     view = clean(read_mesh(data / "shrec16" / f"{name}.off"))
     assert view.repairs
     assert_sound(view)
+
+
+def test_triangles_that_share_no_vertex_are_refused_however_small_each_is() -> None:
+    whole = ball(3)
+    soup = Mesh(whole.vertices[whole.faces].reshape(-1, 3), np.arange(whole.faces.size).reshape(-1, 3))
+    with pytest.raises(InputError, match=r"falls into 1280 pieces .* are not merged.*merge vertices"):
+        clean(soup)

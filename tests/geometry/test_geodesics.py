@@ -203,3 +203,26 @@ def test_loops_of_the_boundary_are_its_pieces() -> None:
     assert SPHERE.boundary_loops == ()
     two = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 0, 0], [6, 0, 0], [5, 1, 0]], [[0, 1, 2], [3, 4, 5]])
     assert [loop.tolist() for loop in two.boundary_loops] == [[0, 1, 2], [3, 4, 5]]
+
+
+def test_bridges_over_a_round_hole_are_the_same_in_every_order_and_frame() -> None:
+    angle = np.arange(200) * 2.0 * np.pi / 200
+    rings = [np.c_[r * np.cos(angle), r * np.sin(angle), np.full(200, 3.0 * r)] for r in (1.0, 1.1, 1.2, 1.3)]
+    vertices = np.vstack(rings)
+    vertices[vertices[:, 0] > 1.2, 2] += 1.0  # so that no turn maps the tube onto itself
+    quads = [(k, k - k % 200 + (k + 1) % 200) for k in range(600)]
+    tube = Mesh(vertices, [f for a, b in quads for f in ((a, b, b + 200), (a, b + 200, a + 200))])
+    order = np.random.default_rng(0).permutation(len(vertices))
+    place = np.argsort(order)
+    turned = Rotation.from_rotvec([0.4, -1.0, 0.3]).as_matrix()
+    other = Mesh(tube.vertices[order], place[tube.faces]).transformed(rotation=turned)
+    sources = np.array([0, 57, 399, 700])
+    here = make_geodesics(tube, "bridged").distances(sources)
+    there = make_geodesics(other, "bridged").distances(place[sources])[:, place]
+    np.testing.assert_allclose(there, here, rtol=1e-9, atol=1e-9)
+
+
+def test_heat_refuses_vertices_in_no_triangle() -> None:
+    loose = Mesh(np.vstack([PLANE.vertices, [[9.0, 9.0, 9.0]]]), PLANE.faces)
+    with pytest.raises(InputError, match="'heat': 1 vertices are in no triangle; clean"):
+        make_geodesics(loose, "heat").distances([0])

@@ -132,3 +132,30 @@ def test_of_many_names_the_nearest_are_shown() -> None:
     message = str(UnknownNameError("pair", "cuts_cat_shape_77", names))
     assert "choose one of 60, such as cuts_cat_shape_" in message
     assert message.count("shape") <= 6
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("a.off", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 99999999999999999999 0\n"),
+        ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999\n"),
+    ],
+)
+def test_numbers_beyond_any_vertex_are_refused(write: Write, name: str, text: str) -> None:
+    with pytest.raises(InputError, match=rf"{name}, row \d: face 0 .* names vertex 4"):
+        read_mesh(write(name, text))
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "words"),
+    [
+        (VERTICES, [[0.7, 1.2, 2.9]], r"face 0 .* names vertex 0.7 of 5"),
+        (VERTICES, [[-1, 0, 1]], r"face 0 .* names vertex -1 of 5"),
+        (VERTICES, [[0, 1, 2], [0, 1]], "faces are rows of different lengths"),
+        (VERTICES, [["a", "b", "c"]], "faces are of type"),
+        ([[0, 0, 0], [1, 0]], FACES, "vertices are rows of different lengths"),
+    ],
+)
+def test_arrays_that_are_no_mesh_are_refused(vertices: list[list[float]], faces: list[list[float]], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        Mesh(vertices, faces)

@@ -84,3 +84,11 @@ def test_bad_masks_are_refused() -> None:
         restrict(grid(3), np.ones(7, dtype=bool))
     with pytest.raises(InputError, match="int64"):
         restrict(grid(3), np.array([0, 1]))
+
+
+def test_points_outside_their_triangle_or_mesh_are_refused() -> None:
+    with pytest.raises(InputError, match="row 1: a barycentric weight is -4; give points inside"):
+        SurfacePoints([0], [[5.0, -4.0, 0.0]])
+    triangle = Mesh([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    with pytest.raises(InputError, match="vertex 9 is not one of the 3"):
+        SurfacePoints.at_vertices(triangle, [9])

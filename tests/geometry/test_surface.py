@@ -10,6 +10,7 @@ import trimesh
 
 from nonrigid.geometry import surface as module
 from nonrigid.geometry.cache import Cache
+from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.surface import Surface
 
@@ -107,3 +108,20 @@ def test_scaling_and_keys(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
     np.testing.assert_allclose(double.distances([0]), 2 * surface.distances([0]), rtol=1e-12)
     assert len(list(tmp_path.glob("*/*.npz"))) == 2
     assert repr(surface) == "Surface(bumpy: 642 vertices, 1280 faces)"
+
+
+def test_numbers_of_vertices_are_checked_and_numpy_counts_taken(tmp_path: Path) -> None:
+    surface = Surface(bumpy(), cache=Cache(tmp_path))
+    for wrong in ([1.9], [True, False], [642], [-1]):
+        with pytest.raises(InputError, match="source vert"):
+            surface.distances(wrong)
+        with pytest.raises(InputError, match="source vert"):
+            surface.distances_between(wrong)
+    assert len(surface.spectrum(np.int64(5)).eigenvalues) == 5  # type: ignore[arg-type]
+    assert len(surface.samples(np.int64(5))) == 5  # type: ignore[arg-type]
+
+
+def test_what_a_mesh_derives_is_read_only() -> None:
+    mesh = bumpy()
+    for name in ("face_areas", "vertex_areas", "vertex_normals", "edges", "boundary_edges", "component_of_vertex"):
+        assert not getattr(mesh, name).flags.writeable, name

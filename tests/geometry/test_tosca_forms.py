@@ -67,3 +67,9 @@ def test_an_unrepairable_mesh_is_named_by_its_file(tmp_path: Path) -> None:
         clean(read_mesh(tmp_path / "two.off"))
     with pytest.raises(InputError, match=r"^two: the surface"):
         clean(far)
+
+
+def test_a_structure_that_holds_no_tables_of_numbers_is_refused(tmp_path: Path) -> None:
+    path = write_mat(tmp_path, X="text")
+    with pytest.raises(InputError, match=r"cat0.mat: the structure does not hold one table"):
+        read_mesh(path)

@@ -26,6 +26,7 @@ from nonrigid.geometry.errors import InputError, UnknownNameError
 from nonrigid.solvers.bounds.bound import BoundError, bound, bound_methods
 from nonrigid.solvers.bounds.clique import colour_classes
 from nonrigid.solvers.bounds.doubly_nonnegative import DoublyNonnegative
+from nonrigid.solvers.solution import Bound
 from nonrigid.solvers.solve import solve
 from nonrigid.solvers.status import Status
 
@@ -157,3 +158,12 @@ def test_what_cannot_be_bounded_says_why() -> None:
     with pytest.raises(InputError):
         bound(bowl, seconds=0)
     assert set(ON_SIMPLEX) <= set(bound_methods())
+
+
+def test_a_bound_that_the_answer_exceeds_certifies_nothing() -> None:
+    u = Variable("u", 3)
+    answer = solve(Problem("game", maximize(QuadraticForm(1.0 - np.eye(3))(u)), u @ Simplex()))
+    refuted = answer.with_bound(Bound(0.1, "mistaken", 0.0))
+    assert refuted.status is Status.STATIONARY
+    assert "the bound 0.1 (mistaken) is refuted" in refuted.message
+    assert answer.with_bound(Bound(answer.objective, "exact", 0.0)).status is Status.CERTIFIED

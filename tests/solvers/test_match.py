@@ -11,6 +11,7 @@ from nonrigid.formulations.formulation import Correspondence, Pair, Stages
 from nonrigid.formulations.model import Problem, QuadraticForm, Simplex, Variable, maximize
 from nonrigid.geometry.errors import InputError, UnknownNameError
 from nonrigid.geometry.mesh import Mesh
+from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.match import match
 from nonrigid.solvers.status import Status
 
@@ -72,3 +73,32 @@ def test_unknown_stages_and_formulations_are_named(pair: Pair) -> None:
         match(pair, object())  # type: ignore[arg-type]
     with pytest.raises(UnknownNameError, match="choose one of"):
         match(pair, TwoGames(), "no-such-library")
+
+
+def test_a_limit_before_the_first_point_ends_the_match(pair: Pair) -> None:
+    found = match(pair, TwoGames(), limits=Limits(seconds=1e-9))
+    assert found.correspondence is None
+    assert found.status is Status.LIMIT
+    assert found.message.startswith("first: 1e-09 s are spent before the first point; raise the limit")
+
+
+@dataclass(frozen=True)
+class Forgetful:
+    """End without a correspondence."""
+
+    answer: object = None
+
+    def stages(self, pair: Pair) -> Stages:
+        yield from TwoGames().stages(pair)
+        return self.answer  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize("answer", [None, 3])
+def test_stages_that_end_without_a_correspondence_are_refused(pair: Pair, answer: object) -> None:
+    with pytest.raises(InputError, match=f"stages of Forgetful ended with {answer}; return a Correspondence"):
+        match(pair, Forgetful(answer))
+
+
+def test_a_negative_seed_is_refused(pair: Pair) -> None:
+    with pytest.raises(InputError, match="seed is -1"):
+        match(pair, TwoGames(), seed=-1)
