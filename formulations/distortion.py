@@ -33,8 +33,9 @@ def distortion(
     removed can only make d longer, never shorter, than the true D; so "one-sided" is max(0, D - d) + excess_weight *
     max(0, d - D), and "certified" is two-sided for pairs of points whose distance the cut left alone, one-sided for the
     others. That is read off distances along mesh edges without a margin, and so holds up to their error and to the
-    length of boundary edges; see `nonrigid.geometry.certificates.certified_pairs`. `geodesics` says how both are measured: "bridged" ones may cross what was cut out, and be
-    too short, so that only "two-sided" has a meaning for them.
+    length of boundary edges; see `nonrigid.geometry.certificates.certified_pairs`. `geodesics` says how both are
+    measured: "bridged" ones may cross what was cut out, and be too short, so that only "two-sided" has a meaning for
+    them.
 
     `keep=False` says that these candidates' distances will not be asked for again, and are not worth a place in the
     cache.

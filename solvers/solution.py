@@ -120,7 +120,7 @@ class Solution:
     def with_bound(self, bound: Bound, tolerance: float = 1e-6) -> Solution:
         """Return the solution with a bound; certified if the gap is at most tolerance * max(1, |objective|).
 
-        A bound that the solution itself exceeds by more than rounding proves nothing, and the message says so.
+        A bound that the solution itself exceeds by more than rounding is left out, and the message says so.
         """
         held = replace(self, bound=bound)
         gap, unit = held.gap, max(1.0, abs(self.objective))
@@ -128,7 +128,7 @@ class Solution:
             return held
         if gap < -ROUNDING * unit:
             refuted = f"the bound {bound.value:.9g} ({bound.method}) is refuted"
-            return replace(held, message=f"{self.message}; {refuted}")
+            return replace(self, message=f"{self.message}; {refuted}")
         if gap <= tolerance * unit:
             return replace(held, status=Status.CERTIFIED, message=f"{bound.method} proves a gap of {gap:.2g}")
         return held

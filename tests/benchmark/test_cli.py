@@ -200,7 +200,9 @@ def test_the_installed_command_behaves_alike(tmp_path: Path) -> None:
 
 
 def test_an_interrupted_benchmark_says_what_is_kept(tmp_path: Path) -> None:
-    code = "from nonrigid.benchmark.cli import main; main()"
+    # Processes begun in the background may ignore the signal from birth.
+    code = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    code += "from nonrigid.benchmark.cli import main; main()"
     words = [sys.executable, "-c", code, "bench", "demo", "--out", "results"]
     child = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
     deadline = time.monotonic() + 60.0

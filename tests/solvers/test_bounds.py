@@ -165,5 +165,6 @@ def test_a_bound_that_the_answer_exceeds_certifies_nothing() -> None:
     answer = solve(Problem("game", maximize(QuadraticForm(1.0 - np.eye(3))(u)), u @ Simplex()))
     refuted = answer.with_bound(Bound(0.1, "mistaken", 0.0))
     assert refuted.status is Status.STATIONARY
+    assert refuted.bound is None
     assert "the bound 0.1 (mistaken) is refuted" in refuted.message
     assert answer.with_bound(Bound(answer.objective, "exact", 0.0)).status is Status.CERTIFIED
