@@ -124,10 +124,15 @@ class Store:
                 "holds no results", file=self.folder, remedy="run `nonrigid bench PLAN --out` with it first"
             )
         found = _read(path)
+        strange = InputError("is no index of results", file=path, remedy="repeat `nonrigid bench PLAN --out` with it")
+        if not isinstance(found, dict):
+            raise strange
         try:
             check_schema(found.get("schema"))
         except InputError as error:
             raise error.at(path) from None
+        if not isinstance(found.get("runs"), dict):
+            raise strange
         return found
 
     def records(self) -> list[Record]:

@@ -116,7 +116,10 @@ def _rewrite(problem: Problem, bridges: tuple[Bridge, ...]) -> Rewritten:
 def _run(backend: Backend, oracle: Oracle, start: FloatArray, limits: Limits) -> tuple[Raw, Exception | None]:
     oracle.begin()
     try:
-        return backend.run(oracle, start, limits), None
+        raw = backend.run(oracle, start, limits)
+        if not isinstance(raw, Raw):
+            raise TypeError(f"run of {backend.name} returned a {type(raw).__name__}, not a Raw")
+        return raw, None
     except (LimitReached, NotFiniteError):
         return Raw(None, "stopped from inside an evaluation"), None
     except Exception as failure:  # any library may raise anything: the attempt fails, not the caller

@@ -52,9 +52,13 @@ def match_command(
     if found.correspondence is not None:
         matched = len(found.correspondence)
         write_corr(out, found.correspondence.dense(len(piece.vertices)))
+    repairs = {file.name: list(s.clean_view.repairs) for file, s in ((part, pair.part), (full, pair.full))}
     if json:
-        show_json(_record(found, matched, out))
+        show_json({**_record(found, matched, out), "repairs": repairs})
     else:
+        for name, done in repairs.items():
+            if done:
+                say(f"{name}, as it was matched: {'; '.join(done)}")
         show_table([stage_row(solution) for solution in found.solutions], title=f"{method}: {part.name} on {full.name}")
     if found.correspondence is None:
         typer.echo(f"nonrigid: {found.message}".replace("\n", " "), err=True)

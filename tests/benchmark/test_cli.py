@@ -221,3 +221,14 @@ def test_a_benchmark_says_why_runs_have_no_match(tmp_path: Path, nonrigid: Comma
     )
     answer = nonrigid("bench", str(tmp_path / "p.toml"), "--out", str(tmp_path / "out"), "--quiet")
     assert "native: 1 without a match (error), such as cuts_cat_shape_1: part_samples is 0" in answer.out
+
+
+def test_match_says_what_was_mended(files: Path, tmp_path: Path, nonrigid: Command) -> None:
+    lines = (files / "part.off").read_text().splitlines()
+    vertices, faces, edges = lines[1].split()
+    lines[1] = f"{vertices} {int(faces) + 1} {edges}"
+    (tmp_path / "part.off").write_text("\n".join([*lines, "3 0 0 1", ""]))
+    words = ("match", tmp_path / "part.off", files / "full.off", "--out", tmp_path / "m.corr", *SMALL)
+    mended = "dropped 1 face that names a vertex twice"
+    assert f"part.off, as it was matched: {mended}" in nonrigid(*words).out
+    assert json.loads(nonrigid(*words, "--json").out)["repairs"] == {"part.off": [mended], "full.off": []}

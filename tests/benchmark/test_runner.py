@@ -207,3 +207,9 @@ def test_a_mesh_that_cannot_be_matched_is_a_row(plan: Plan, tmp_path: Path, monk
     monkeypatch.setattr("nonrigid.benchmark.task.Pair.of", refuse)
     records = run_plan(plan, tmp_path, quiet=True)
     assert {(record["status"], record["message"]) for record in records} == {("error", "two pieces; keep one")}
+
+
+def test_a_file_that_is_no_index_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "index.json").write_text("[]")
+    with pytest.raises(InputError, match=r"index\.json: is no index of results; repeat"):
+        Store(tmp_path).index()

@@ -287,3 +287,15 @@ def test_a_killed_solve_keeps_its_route_and_claim() -> None:
     assert answer.route == ("radial", "broken:descent")
     assert not answer.usable
     assert "before the first point" in answer.message
+
+
+@dataclass(frozen=True)
+class ReturnsAnArray(Honest):
+    def run(self, oracle: Oracle, start: FloatArray, limits: Limits) -> Raw:
+        return start  # type: ignore[return-value]
+
+
+def test_a_run_that_returns_no_raw_answer_is_a_backend_error() -> None:
+    answer = solve(convex_quadratic().problem, ReturnsAnArray(), start=START)
+    assert answer.status is Status.BACKEND_ERROR
+    assert "run of broken returned a ndarray, not a Raw" in answer.message
