@@ -14,10 +14,11 @@ from scipy.sparse.csgraph import dijkstra
 
 from nonrigid.geometry.arrays import IntArray
 from nonrigid.geometry.clean import clean
+from nonrigid.geometry.frame import canonical_priority
 from nonrigid.geometry.geodesics import virtual_edge_graph
 from nonrigid.geometry.io import read_mesh
 from nonrigid.geometry.mesh import Mesh
-from nonrigid.geometry.sampling import canonical_priority, farthest_points
+from nonrigid.geometry.sampling import farthest_points
 
 
 def unpruned(mesh: Mesh, count: int, start: int) -> IntArray:

@@ -10,12 +10,9 @@ from scipy.sparse.csgraph import dijkstra
 
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.errors import InputError, UnknownNameError
-from nonrigid.geometry.frame import canonical_frame
+from nonrigid.geometry.frame import canonical_priority, farthest
 from nonrigid.geometry.geodesics.dijkstra import virtual_edge_graph
 from nonrigid.geometry.mesh import Mesh
-
-TIE = 1e-9  # distances closer than this, relatively, are equal: rounding may not choose the sample
-FUNCTIONAL = np.array([1.0, 0.7548776662466927, 0.5698402909980532])  # irrational ratios: no mesh symmetry keeps it
 
 
 def farthest_points(
@@ -77,33 +74,6 @@ def farthest_points(
         samples[k + 1] = farthest(cover, priority)
         radius = cover[samples[k + 1]]
     return samples
-
-
-def canonical_priority(mesh: Mesh) -> FloatArray:
-    """Rank the vertices by a generic linear functional in a frame the shape carries with it.
-
-    The frame is `nonrigid.geometry.frame.canonical_frame`. Values are divided by sqrt(area): they are the same, up to
-    rounding, after rigid motion, scaling and re-ordering.
-
-    Returns
-    -------
-    priority
-        (n,) dimensionless values.
-
-    Examples
-    --------
-    >>> strip = Mesh([[0, 0, 0], [1, 0, 0], [4, 0, 0], [0, 1, 0]], [[0, 1, 3], [1, 2, 3]])
-    >>> bool(np.allclose(canonical_priority(strip), canonical_priority(strip.transformed(scale=3.0))))
-    True
-    """
-    centroid, axes = canonical_frame(mesh)
-    return np.asarray((mesh.vertices - centroid) @ (axes @ FUNCTIONAL) / (np.sqrt(mesh.area) or 1.0))
-
-
-def farthest(distances: FloatArray, priority: FloatArray) -> int:
-    """Return the number of the largest distance; of those within `TIE` of it, the one with the largest priority."""
-    tied = np.flatnonzero(distances >= (1.0 - TIE) * distances.max())
-    return int(tied[np.argmax(priority[tied])])
 
 
 def _centroid_distances(mesh: Mesh) -> FloatArray:

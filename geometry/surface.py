@@ -15,11 +15,12 @@ from nonrigid.geometry.clean import CleanMesh, clean
 from nonrigid.geometry.descriptors.heat_kernel import heat_kernel_signature, heat_times
 from nonrigid.geometry.descriptors.shot import shot
 from nonrigid.geometry.descriptors.wave_kernel import wave_energies, wave_kernel_signature
+from nonrigid.geometry.frame import canonical_priority
 from nonrigid.geometry.geodesics import Geodesics, make_geodesics
 from nonrigid.geometry.geodesics.protocol import checked_vertices
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.operators import Laplacian, laplacian
-from nonrigid.geometry.sampling import canonical_priority, farthest_points
+from nonrigid.geometry.sampling import farthest_points
 from nonrigid.geometry.spectrum import Spectrum, spectrum
 
 LARGEST_STORED = 64_000_000

@@ -9,10 +9,10 @@ import numpy as np
 
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.geometry.cache import Arrays, content_hash
+from nonrigid.geometry.frame import canonical_priority
 from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.points import SurfacePoints
 from nonrigid.geometry.remesh import closest_points, decimate
-from nonrigid.geometry.sampling import canonical_priority
 
 DIGITS = 6
 """Coordinates are rounded to this many digits after the point of a mesh whose area is one."""

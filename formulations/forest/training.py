@@ -16,8 +16,8 @@ from nonrigid.formulations.forest.tree import Tree
 from nonrigid.formulations.formulation import Pair
 from nonrigid.geometry.arrays import IntArray
 from nonrigid.geometry.errors import InputError
+from nonrigid.geometry.frame import canonical_priority
 from nonrigid.geometry.points import SurfacePoints
-from nonrigid.geometry.sampling import canonical_priority
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

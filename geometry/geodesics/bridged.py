@@ -9,9 +9,9 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from nonrigid.geometry.arrays import FloatArray, IntArray
+from nonrigid.geometry.frame import canonical_priority, farthest
 from nonrigid.geometry.geodesics.dijkstra import DijkstraGeodesics, surface_segments, symmetric_graph
 from nonrigid.geometry.mesh import Mesh
-from nonrigid.geometry.sampling import canonical_priority, farthest
 
 BULGE = 1.15
 """Length of a way over a missing patch, in units of the straight line across: patches of bodies are curved."""

@@ -12,9 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from nonrigid.geometry.arrays import IntArray
 from nonrigid.geometry.errors import InputError, UnknownNameError
+from nonrigid.geometry.frame import canonical_priority
 from nonrigid.geometry.geodesics import virtual_edge_graph
 from nonrigid.geometry.mesh import Mesh
-from nonrigid.geometry.sampling import canonical_priority, farthest_points
+from nonrigid.geometry.sampling import farthest_points
 
 
 def mirror_symmetric() -> Mesh:
