@@ -190,7 +190,7 @@ def low_pass(rows: FloatArray, images: FloatArray, mass: FloatArray) -> Problem:
     Examples
     --------
     >>> print(low_pass(np.eye(3, 2), np.eye(3), np.ones(3)))
-    low-pass: minimize SquaredResidual(C)
+    low-pass: minimize SquaredResidual(C) + 1
       subject to C in Box(-inf, inf)
       with C of shape (3, 2)
     """

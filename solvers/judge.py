@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from nonrigid.formulations.model import Problem, Sense
+from nonrigid.formulations.model import Curvature, Problem, Sense
 from nonrigid.geometry.arrays import BoolArray, FloatArray
 from nonrigid.solvers.layout import Layout
 
@@ -43,8 +43,11 @@ def judge(problem: Problem, values: Values) -> Judgement:
 
     Stationarity is, per variable and summed: where the set (or its convex body) has a closed-form linear maximiser, the
     Frank-Wolfe gap max_s g'(s - x) with g the gradient of the function maximized, in units of the objective; where the
-    set has only a projection, the largest entry of |P(x + g) - x|; where named constraints stand in the problem, the
-    largest entry of a KKT residual with multipliers by least squares (an upper bound of the smallest one).
+    set has only a projection, see `_projected_residual`; where named constraints stand in the problem, the largest
+    entry of a KKT residual with multipliers by least squares (an upper bound of the smallest one).
+
+    On a surface that is not convex, and up which no objective pushes, a local optimum has a gap over the convex hull:
+    there the largest slope along the surface counts, if that is less.
     """
     point = restore(problem, values)
     objective, gradient = problem.objective.value_and_gradient(point)
@@ -54,8 +57,10 @@ def judge(problem: Problem, values: Values) -> Judgement:
     if problem.constraints or not all(_closed_form(member.set) for member in problem.memberships):
         residual = kkt_residual(problem, point)
     else:
+        curved = problem.curvature is not Curvature.AFFINE
         residual = sum(
-            _set_residual(m.set, point[m.variable.name], sign * gradient[m.variable.name]) for m in problem.memberships
+            _set_residual(m.set, point[m.variable.name], sign * gradient[m.variable.name], curved=curved)
+            for m in problem.memberships
         )
     return Judgement(point, objective, violation(problem, point), residual)
 
@@ -64,11 +69,26 @@ def _closed_form(set_: Any) -> bool:
     return hasattr(set_, "linear_max") or hasattr(set_, "project")
 
 
-def _set_residual(set_: Any, x: FloatArray, ascent: FloatArray) -> float:
-    if hasattr(set_, "linear_max"):
-        best = set_.linear_max(ascent)
-        return max(float(np.sum(ascent * best) - np.sum(ascent * x)), 0.0)
-    return float(np.max(np.abs(set_.project(x + ascent) - x), initial=0.0))
+def _set_residual(set_: Any, x: FloatArray, ascent: FloatArray, *, curved: bool) -> float:
+    if not hasattr(set_, "linear_max"):
+        return _projected_residual(set_, x, ascent)
+    best = set_.linear_max(ascent)
+    gap = max(float(np.sum(ascent * best) - np.sum(ascent * x)), 0.0)
+    along = set_.slope_along(x, ascent) if curved and not set_.convex and hasattr(set_, "slope_along") else None
+    return gap if along is None else min(gap, float(along))
+
+
+def _projected_residual(set_: Any, x: FloatArray, ascent: FloatArray) -> float:
+    """Return the largest entry of |P(x + s g) - x| with s the largest entry of |x|, at least 1, or of g times the room.
+
+    A length has to be seen beside the point's own, or an objective without a bound is flat enough once it is large;
+    and a box of width w holds any step to w, so that there, where w < 1, what the step would gain counts too.
+    """
+    length = max(1.0, float(np.abs(x).max(initial=0.0)))
+    moved = float(np.max(np.abs(set_.project(x + length * ascent) - x), initial=0.0))
+    lower, upper = set_.bounds(x.shape)
+    room = np.minimum(np.where(ascent > 0.0, upper - x, x - lower), 1.0)
+    return max(moved, float(np.max(np.abs(ascent) * room, initial=0.0)))
 
 
 def kkt_residual(problem: Problem, point: Values) -> float:

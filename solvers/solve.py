@@ -114,10 +114,11 @@ def _starts(problem: Problem, start: Values | Solution | None, count: int, seed:
     return [first, *others]
 
 
-def _merit(answer: Solution) -> tuple[bool, float]:
+def _merit(answer: Solution) -> tuple[bool, bool, float]:
+    """Return what the better answer has more of: a proof comes before what lies within its tolerance."""
     sign = 1.0 if answer.sense is Sense.MAXIMIZE else -1.0
     worth = sign * answer.objective
-    return answer.usable, worth if np.isfinite(worth) else -np.inf
+    return answer.usable, answer.status is Status.CERTIFIED, worth if np.isfinite(worth) else -np.inf
 
 
 def _as_attempt(answer: Solution) -> Attempt:

@@ -117,6 +117,18 @@ class ElasticNet:
             return self.linear_max(x)
         return self.restore(np.maximum(x - multiplier[within[-1]] * linear, 0.0))
 
+    def slope_along(self, x: FloatArray, ascent: FloatArray) -> float | None:
+        """Return the largest entry of the ascent along the surface; None where it pushes outward, off the body.
+
+        Entries can fall to 0 and no further.
+        """
+        normal = self.gauge_and_gradient(x)[1]
+        outward = float(ascent @ x) / float(normal @ x)
+        if outward >= 0.0:
+            return None
+        rest = ascent - outward * normal
+        return float(np.abs(np.maximum(rest, -x)).max(initial=0.0))
+
     def lower(self, x: Any, ops: Any) -> list[Any]:
         """Write the surface as constraints; not convex unless mix = 0."""
         return [ops.at_most(0.0, x), ops.equal(self._lowered_level(x, ops), 1.0)]

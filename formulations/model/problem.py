@@ -122,6 +122,11 @@ class Problem:
         if missing := sorted(used - set(names)):
             raise ModelError(f"problem {name!r} uses {missing} but puts them in no set; add `{missing[0]} @ free()`")
         shapes = {variable.name: variable.shape for variable in self.variables}
+        named = [variable for variable, _ in self.constraints.values()]
+        for variable in [*(v for term in objective.terms for v in term.variables), *named]:
+            if variable.shape != shapes[variable.name]:
+                shown = f"{variable.shape} in a term or constraint, {shapes[variable.name]} in its set"
+                raise ModelError(f"problem {name!r} has {variable.name!r} of shape {shown}; use one variable in both")
         for key, value in self.start.items():
             if shapes.get(key) != np.shape(value) or not np.isfinite(value).all():
                 given = f"{key!r} of shape {np.shape(value)}"
@@ -188,17 +193,28 @@ class Problem:
         """Return the problem as one display of LaTeX."""
         verb = "max" if self.objective.sense is Sense.MAXIMIZE else "min"
         names = ", ".join(variable.name for variable in self.variables)
-        formula = " + ".join(term.latex() for term in self.objective.terms)
+        formula = self._sum([term.latex() for term in self.objective.terms])
         sets = [member.set.latex(member.variable.name) for member in self.memberships]
-        limits = r",\ ".join([text for text in sets if text] + [rf"\text{{{name}}}" for name in self.constraints])
+        limits = r",\ ".join(
+            [text for text in sets if text] + [rf"\text{{{_escaped(name)}}}" for name in self.constraints]
+        )
         return rf"\{verb}_{{{names}}}\; {formula}" + (rf" \quad\text{{s.t.}}\quad {limits}" if limits else "")
 
+    def _sum(self, terms: list[str]) -> str:
+        constant = self.objective.constant
+        parts = [*terms, f"{constant:g}"] if constant or not terms else terms
+        return " + ".join(parts).replace("+ -", "- ")
+
     def __str__(self) -> str:
-        formula = " + ".join(str(term) for term in self.objective.terms)
+        formula = self._sum([str(term) for term in self.objective.terms])
         sets = ", ".join(str(member) for member in self.memberships)
         shapes = ", ".join(f"{variable.name} of shape {variable.shape}" for variable in self.variables)
         named = "".join(f"\n  and {name}" for name in self.constraints)
         return f"{self.name}: {self.objective.sense.value} {formula}\n  subject to {sets}{named}\n  with {shapes}"
+
+
+def _escaped(name: str) -> str:
+    return name.replace("_", r"\_")
 
 
 def _within(term: Applied, values: Mapping[str, FloatArray]) -> bool:

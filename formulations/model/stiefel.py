@@ -47,6 +47,11 @@ class Stiefel:
     restore = project
     linear_max = project
 
+    def slope_along(self, x: FloatArray, ascent: FloatArray) -> float:
+        """Return the largest entry of the ascent along the manifold, G - C sym(C'G)."""
+        inner = x.T @ ascent
+        return float(np.abs(ascent - x @ (0.5 * (inner + inner.T))).max(initial=0.0))
+
     def bounds(self, shape: tuple[int, ...]) -> tuple[FloatArray, FloatArray]:
         """Return -1 <= C <= 1."""
         return -np.ones(_checked(shape)), np.ones(shape)

@@ -85,7 +85,10 @@ class Applied:
         names = [variable.name for variable in self.variables]
         formula = getattr(self.term, "latex", None)
         text = formula(names) if formula is not None else rf"\mathrm{{{type(self.term).__name__}}}({', '.join(names)})"
-        return text if self.weight == 1.0 else rf"{self.weight:g}\, {text}"
+        if self.weight == 1.0:
+            return text
+        bracketed = rf"\left({text}\right)" if " + " in text or " - " in text else text
+        return rf"{self.weight:g}\, {bracketed}"
 
     def __str__(self) -> str:
         names = ", ".join(variable.name for variable in self.variables)

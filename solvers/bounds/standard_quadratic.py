@@ -49,6 +49,7 @@ def standard_quadratic(problem: Problem, *, simplex: bool = True, most: int | No
     sign = 1.0 if problem.objective.sense is Sense.MAXIMIZE else -1.0
     matrix: Any = applied.term.matrix
     dense = np.asarray(matrix if isinstance(matrix, np.ndarray) else matrix.toarray())
+    dense = 0.5 * (dense + dense.T)  # what rounding left unequal, a shift could make large beside the rest
     return StandardQuadratic(sign * applied.weight * dense, sign, problem.objective.constant, surface)
 
 

@@ -27,6 +27,8 @@ class ToBody:
             return "a variable on a simplex, elastic net or sphere"
         if problem.objective.sense is not Sense.MAXIMIZE:
             return "a problem that maximizes"
+        if problem.constraints:
+            return f"no named constraints, and {sorted(problem.constraints)} stand in the problem"
         for applied in problem.objective.terms:
             if not getattr(applied.term, "monotone", False) or applied.weight < 0:
                 return f"terms that do not fall as x grows, which {applied} does not promise"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -69,7 +69,7 @@ class KktMixedInteger:
         }
         rewritten = Problem(
             problem.name,
-            maximize(game.weight * Linear(payoff)(k)),
+            replace(maximize(game.weight * Linear(payoff)(k)), constant=problem.objective.constant),
             Membership(k, MixedBinary(integral=integral, upper=upper)),
             constraints=MappingProxyType(constraints),
         )

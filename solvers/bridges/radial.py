@@ -1,4 +1,4 @@
-"""From a surface to the nonnegative orthant by scaling, for solvers that know bounds only."""
+"""From a surface to the unit box by scaling, for solvers that know bounds only."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from nonrigid.formulations.model import Applied, Membership, Objective, Problem, nonnegative
+from nonrigid.formulations.model import Applied, Box, Membership, Objective, Problem
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.acceptance import Claim, Rewritten
 from nonrigid.solvers.judge import Values, restore
@@ -15,7 +15,7 @@ from nonrigid.solvers.judge import Values, restore
 
 @dataclass(frozen=True, eq=False)
 class OnRays:
-    """Evaluate a term at y / gauge(y): constant along rays, so that bounds y >= 0 suffice."""
+    """Evaluate a term at y / gauge(y): constant along rays, so that bounds suffice."""
 
     term: Any
     surface: Any
@@ -35,10 +35,10 @@ class OnRays:
 
 @dataclass(frozen=True)
 class Radial:
-    """Replace u on a surface {x >= 0, gauge(x) = 1} by y >= 0 with u = y / gauge(y).
+    """Replace u on a surface {x >= 0, gauge(x) = 1} by 0 <= y <= 1 with u = y / gauge(y).
 
-    Exact: every ray meets the surface once. The objective is flat along rays, which suits quasi-Newton methods and
-    misleads interior-point ones.
+    Exact: every ray meets the surface once, inside the box. The objective is flat along rays, which suits quasi-Newton
+    methods and misleads interior-point ones; without the upper bound some drift outward, where gradients vanish.
     """
 
     name: str = "radial"
@@ -61,7 +61,7 @@ class Radial:
         sets: dict[str, Any] = {member.variable.name: member.set for member in problem.memberships}
         terms = tuple(_on_rays(applied, sets) for applied in problem.objective.terms)
         memberships = tuple(
-            Membership(m.variable, nonnegative() if hasattr(m.set, "gauge_and_gradient") else m.set)
+            Membership(m.variable, Box(0.0, 1.0) if hasattr(m.set, "gauge_and_gradient") else m.set)
             for m in problem.memberships
         )
         objective = Objective(problem.objective.sense, terms, problem.objective.constant)

@@ -32,6 +32,7 @@ from nonrigid.formulations.model import (
 )
 from nonrigid.formulations.model.assignment_sets import Assignment, PartialPermutation, cheapest_assignment
 from nonrigid.formulations.model.ops import NumpyOps
+from nonrigid.formulations.model.terms.gram_penalty import GramPenalty
 from nonrigid.geometry.arrays import FloatArray
 
 C, v = Variable("C", (2, 3)), Variable("v", 3)
@@ -246,3 +247,23 @@ def test_costs_that_are_not_finite_are_refused_and_such_points_restored() -> Non
 
 def test_a_point_far_outside_is_projected_onto_the_simplex() -> None:
     assert Simplex().project(np.array([1e17, 0.0])).tolist() == [1.0, 0.0]
+
+
+def test_a_printed_problem_is_the_problem() -> None:
+    C = Variable("C", (2, 2))
+    w = Variable("w", 2)
+    pair = Problem(
+        "pair",
+        minimize(0.5 * GramPenalty(np.ones(2), 0.3)(C) + -2.0 * SQUARES(w)),
+        C @ free(),
+        w @ free(),
+        constraints={"area_at_least": (w, SmoothConstraint("at most", lambda x: (-x, -np.eye(2)), linear=True))},
+    )
+    text = pair.latex()
+    assert r"0.5\, \left(" in text
+    assert "+ -" not in text + str(pair)
+    assert r"\text{area\_at\_least}" in text
+    fixed = pair.fix(C=np.ones((2, 2)))
+    assert f"{fixed.objective.constant:g}" in str(fixed)
+    with pytest.raises(ModelError, match=r"has 'w' of shape \(3,\) in a term or constraint, \(2,\) in its set"):
+        Problem("p", minimize(SQUARES(Variable("w", 3))), w @ free())

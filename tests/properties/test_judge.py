@@ -18,12 +18,17 @@ from nonrigid.formulations.model import (
     Smooth,
     SmoothConstraint,
     Variable,
+    free,
     maximize,
     minimize,
 )
+from nonrigid.formulations.model.stiefel import Stiefel
 from nonrigid.formulations.model.terms.linear import Linear
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.judge import judge, kkt_residual, restore, violation
+from nonrigid.solvers.limits import Limits
+from nonrigid.solvers.solve import solve
+from nonrigid.solvers.status import Status
 
 x3 = Variable("x", 3)
 
@@ -48,7 +53,7 @@ def test_where_there_is_only_a_projection_the_step_is_measured() -> None:
     term = Smooth(lambda x: 0.5 * float(((x - target) ** 2).sum()), lambda x: x - target)
     problem = Problem("nearest", minimize(term(x3)), x3 @ Box(-1.0, 1.0))
     assert judge(problem, {"x": target}).stationarity == 0.0  # restored to (1, 0.5, -1), the optimum
-    assert judge(problem, {"x": np.zeros(3)}).stationarity == 1.0
+    assert judge(problem, {"x": np.zeros(3)}).stationarity == 3.0
 
 
 def test_a_set_without_closed_forms_is_judged_by_kkt() -> None:
@@ -110,3 +115,33 @@ def test_restoring_is_per_variable_and_stationarity_adds_up() -> None:
     single = [Problem("one", maximize(form(v)), v @ Simplex()) for v in (x, y)]
     parts = sum(judge(p, {p.variables[0].name: values[p.variables[0].name]}).stationarity for p in single)
     assert judge(both, values).stationarity == pytest.approx(parts)
+
+
+def test_an_objective_without_a_bound_is_nowhere_stationary() -> None:
+    falling = Problem("falling", minimize(Linear(np.ones(3))(x3)), x3 @ free())
+    assert judge(falling, {"x": np.full(3, -1e8)}).stationarity >= 1e8
+    for backend in ("native", "scipy:L-BFGS-B", "nlopt:LD_LBFGS"):
+        assert solve(falling, backend, limits=Limits(evaluations=300)).status is not Status.STATIONARY
+
+
+def test_in_a_narrow_box_the_gain_counts_not_the_step() -> None:
+    narrow = Problem("narrow", minimize(1e9 * Linear(np.ones(3))(x3)), x3 @ Box(0.0, 1e-7))
+    assert judge(narrow, {"x": np.full(3, 1e-7)}).stationarity == pytest.approx(100.0)
+    assert judge(narrow, {"x": np.zeros(3)}).stationarity == 0.0
+
+
+def test_minima_on_curved_surfaces_are_stationary_and_other_points_are_not() -> None:
+    rng = np.random.default_rng(3)
+    root = rng.standard_normal((3, 3))
+    form = QuadraticForm(root @ root.T + 3.0 * np.eye(3))
+    problem = Problem("least", minimize(form(x3)), x3 @ ElasticNet(mix=1.0))
+    best = min((solve(problem, "nlopt:LD_SLSQP", starts=5),), key=lambda answer: answer.objective)
+    assert judge(problem, best.values).stationarity <= 1e-5
+    assert judge(problem, {"x": np.array([1.0, 2.0, 0.1])}).stationarity > 0.1
+    A, target = rng.standard_normal((3, 5)), rng.standard_normal((3, 5))
+    C = Variable("C", (3, 3))
+    squares = Smooth(lambda c: float(np.square(c @ A - target).sum()), lambda c: 2.0 * (c @ A - target) @ A.T)
+    nearest = Problem("nearest", minimize(squares(C)), C @ Stiefel())
+    left, _, right = np.linalg.svd(target @ A.T)
+    assert judge(nearest, {"C": left @ right}).stationarity <= 1e-12
+    assert judge(nearest, {"C": np.eye(3)}).stationarity > 0.1

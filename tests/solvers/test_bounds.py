@@ -21,6 +21,8 @@ from nonrigid.formulations.model import (
     maximize,
     minimize,
 )
+from nonrigid.formulations.model.assignment_sets import PartialPermutation
+from nonrigid.formulations.model.terms.linear import Linear
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.geometry.errors import InputError, UnknownNameError
 from nonrigid.solvers.bounds.bound import BoundError, bound, bound_methods
@@ -168,3 +170,23 @@ def test_a_bound_that_the_answer_exceeds_certifies_nothing() -> None:
     assert refuted.bound is None
     assert "the bound 0.1 (mistaken) is refuted" in refuted.message
     assert answer.with_bound(Bound(answer.objective, "exact", 0.0)).status is Status.CERTIFIED
+
+
+@pytest.mark.parametrize("method", ["doubly_nonnegative", "eigenvalue", "auto"])
+def test_rounding_of_a_matrix_is_no_fault_of_its_bound(method: str) -> None:
+    rng = np.random.default_rng(0)
+    u = Variable("u", 4)
+    matrix = -5.0 + 1e-13 * rng.standard_normal((4, 4))
+    problem = Problem("even", maximize(QuadraticForm(matrix)(u)), u @ Simplex())
+    found = bound(problem, method).value
+    assert found >= -5.0 - 1e-6
+    assert method == "eigenvalue" or found <= -5.0 + 1e-4
+
+
+def test_a_chain_keeps_the_proof_of_a_later_attempt() -> None:
+    P = Variable("P", (3, 3))
+    problem = Problem("assignment", minimize(Linear(np.arange(9.0).reshape(3, 3) % 4)(P)), P @ PartialPermutation())
+    answer = solve(problem, ["cvxpy:CLARABEL", "native"])
+    assert [attempt.status for attempt in answer.attempts] == [Status.FEASIBLE, Status.CERTIFIED]
+    assert answer.attempts[0].objective == pytest.approx(answer.attempts[1].objective)
+    assert answer.status is Status.CERTIFIED

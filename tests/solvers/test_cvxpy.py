@@ -24,6 +24,7 @@ from nonrigid.formulations.model.binary_sets import binary
 from nonrigid.formulations.model.terms.linear import Linear
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.solvers.backends.cvxpy import BACKEND
+from nonrigid.solvers.bridges.body import ToBody
 from nonrigid.solvers.limits import Limits
 from nonrigid.solvers.route import route
 from nonrigid.solvers.solve import solve
@@ -190,3 +191,19 @@ def test_refusals_give_the_reason() -> None:
     assert "2 entries are integral" in whole["OSQP"]
     assert whole["HIGHS"] == "native"
     assert set(curved) == set(BACKEND.algorithms)
+
+
+def test_a_variable_in_no_term_stays_where_its_set_begins() -> None:
+    u, v = Variable("u", 3), Variable("v", 2)
+    problem = Problem("unused", minimize(Linear(np.arange(3.0))(u)), u @ Simplex(), v @ free())
+    answer = solve(problem, "cvxpy:CLARABEL")
+    assert answer.status is Status.STATIONARY
+    assert answer["v"].tolist() == [0.0, 0.0]
+
+
+def test_a_body_is_no_way_round_named_constraints() -> None:
+    u = Variable("u", 2)
+    apart = QuadraticForm(np.array([[0.0, 1.0], [1.0, 0.0]]))
+    few = {"few": (u, SmoothConstraint("at most", lambda x: (x - np.array([0.1, 0.2]), np.eye(2)), linear=True))}
+    problem = Problem("game", maximize(apart(u)), u @ Simplex(), constraints=few)
+    assert "named constraints" in str(ToBody().obstacle(problem))

@@ -164,3 +164,20 @@ def test_refusals_name_the_number_and_the_way_out() -> None:
     u = Variable("u", 2)
     bowl = Problem("bowl", minimize(Smooth(lambda x: float(x @ x), lambda x: 2 * x)(u)), u @ free())
     assert isinstance(Native("projected_gradient").accepts(bowl), Refused)
+
+
+def test_the_replicator_ends_on_a_face_that_it_cannot_leave() -> None:
+    u = Variable("u", 3)
+    game = np.array([[0.0, 1.0, 2.0], [1.0, 0.0, 2.0], [2.0, 2.0, 0.0]])
+    start = {"u": np.array([0.5, 0.5, 0.0])}
+    problem = Problem("game", maximize(QuadraticForm(game)(u)), u @ Simplex())
+    answer = solve(problem, "native:replicator", start=start, limits=Limits(evaluations=100))
+    assert answer.status is Status.FEASIBLE
+    assert answer.evaluations < 10
+
+
+def test_a_start_without_payoff_is_an_answer_if_no_more_is_granted() -> None:
+    u = Variable("u", 3)
+    problem = Problem("game", maximize(QuadraticForm(1.0 - np.eye(3))(u)), u @ Simplex())
+    answer = solve(problem, start={"u": np.array([1.0, 0.0, 0.0])}, limits=Limits(evaluations=1))
+    assert answer.usable

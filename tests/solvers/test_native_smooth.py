@@ -136,3 +136,21 @@ def test_a_wrong_start_is_refused_in_words(arguments: dict[str, object], words: 
     x = Variable("x", 2)
     with pytest.raises(ModelError, match=words):
         Problem("wrong", valley(2, Box()).objective, x @ free(), **arguments)  # type: ignore[arg-type]
+
+
+def test_a_path_bent_onto_a_bound_is_not_followed_for_ever() -> None:
+    Q = np.array([[0.2, -0.7], [-0.7, 2.2]])
+    x = Variable("x", 2)
+    term = Smooth(lambda at: float(at @ Q @ at), lambda at: 2.0 * Q @ at)
+    problem = Problem("saddle", minimize(term(x)), x @ Box(-1.0, 2.0), start={"x": np.array([0.93, 0.38])})
+    answer = solve(problem, "native:limited_memory", limits=Limits(evaluations=1000))
+    assert answer.status is Status.STATIONARY
+    assert answer.objective == pytest.approx(-0.2 / 2.2, abs=1e-6)
+
+
+def test_robust_regression_with_too_few_descriptors_takes_the_least_map() -> None:
+    rng = np.random.default_rng(0)
+    A, B = rng.standard_normal((6, 3)), rng.standard_normal((4, 3))
+    C = Variable("C", (4, 6))
+    answer = solve(Problem("few", minimize(GroupNorm21(A, B)(C)), C @ free()), "native:reweighted")
+    assert answer.objective == pytest.approx(0.0, abs=1e-5)

@@ -59,9 +59,14 @@ class Lowered:
             self.variables[name].value = value
 
     def point(self) -> FloatArray | None:
-        """Return the variables' values, None where a solver left none."""
+        """Return the variables' values, None where a solver left none; those in no term or constraint have none."""
         values = {name: variable.value for name, variable in self.variables.items()}
-        return None if any(value is None for value in values.values()) else self.layout.join(values)
+        if all(value is None for value in values.values()):
+            return None
+        for member in self.problem.memberships:
+            if values[member.variable.name] is None:
+                values[member.variable.name] = member.set.center(member.variable.shape)
+        return self.layout.join(values)
 
     def _membership(self, member: Any) -> list[Any]:
         variable = self.variables[member.variable.name]

@@ -44,6 +44,8 @@ def limited_memory(oracle: Oracle, start: FloatArray, limits: Limits) -> tuple[F
             direction = -reduced
         first = 1.0 if pairs else 0.1 * max(1.0, float(np.abs(x).max())) / float(np.abs(direction).max())
         found = _wolfe(_Path(oracle, x, direction), _Trial(0.0, f, float(reduced @ direction), x, g), first)
+        if found is not None and found.value >= f:
+            found = None  # a path bent onto a bound may end where it began
         if found is None and not pairs:
             return x, "no descent along the gradient"
         if found is None:

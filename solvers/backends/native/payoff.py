@@ -81,6 +81,7 @@ class Ascent:
         x = self.surface.restore(start)
         g = self.product(x)
         if float(x @ g) <= 0.0 < self.payoff.matrix.max():
+            self.show(x, float(x @ g))
             x = self.surface.center(x.shape)
             g = self.product(x)
         self.show(x, float(x @ g))

@@ -24,4 +24,6 @@ def replicator(game: QuadraticGame, oracle: Oracle, start: FloatArray, limits: L
             return x, "every strategy played has payoff 0"
         if 2.0 * (float(payoff.max()) - mean) <= limits.tolerance * max(1.0, abs(value)):
             return x, "gap below tolerance"
+        if 2.0 * (float(payoff[x > 0.0].max()) - mean) <= limits.tolerance * max(1.0, abs(value)):
+            return x, "gap below tolerance among the strategies played; others never enter"
         x = x * payoff / mean

@@ -63,13 +63,21 @@ def reweighted(oracle: Oracle, start: FloatArray, limits: Limits) -> tuple[Float
     value, gradient = oracle.value_and_gradient(x)
     while np.max(np.abs(gradient)) > 0.1 * limits.tolerance * max(1.0, abs(value)):
         lengths = np.linalg.norm(x.reshape(regression.mask.shape) @ source - target, axis=0)
-        scaled = source * (weight / np.maximum(lengths, 1e-9 * max(float(lengths.max()), 1e-300)))
+        scaled = source * (weight / np.maximum(lengths, max(1e-9 * float(lengths.max()), 1e-150)))
         systems = np.broadcast_to(scaled @ source.T, (len(target), len(source), len(source))).copy()
         systems[:, diagonal, diagonal] += 2.0 * regression.mask**2
-        rows = np.linalg.solve(systems, (target @ scaled.T)[:, :, None])[:, :, 0]
+        rows = _solved(systems, (target @ scaled.T)[:, :, None])[:, :, 0]
         moved = rows.ravel()
         fresh, gradient = oracle.value_and_gradient(moved)
         if fresh >= value:
             return x, "no descent beyond rounding"
         x, value = moved, fresh
     return x, "gradient below tolerance"
+
+
+def _solved(systems: FloatArray, right: FloatArray) -> FloatArray:
+    """Return the solutions of symmetric systems, those of least norm where one is singular: too few descriptors."""
+    try:
+        return np.asarray(np.linalg.solve(systems, right))
+    except np.linalg.LinAlgError:
+        return np.asarray(np.linalg.pinv(systems, rcond=1e-12, hermitian=True) @ right)
