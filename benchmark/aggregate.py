@@ -78,7 +78,7 @@ def scored_rows(records: Sequence[Mapping[str, Any]]) -> list[ScoredRow]:
             kept_area=record["kept_area"],
         )
         for record in records
-        if record.get("match_count") is not None
+        if record.get("match_count") is not None and record.get("curve") is not None
     ]
 
 

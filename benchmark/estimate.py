@@ -44,17 +44,20 @@ class Estimate:
     rows: tuple[Mapping[str, object], ...]
 
 
-def estimate(plan: Plan, out: Path, *, workers: int = 1) -> Estimate:
-    """Estimate what the runs take that `run_plan` would do, without reading a mesh.
+def estimate(
+    plan: Plan, out: Path, *, workers: int = 1, share: tuple[int, int] = (1, 1), fresh: bool = False
+) -> Estimate:
+    """Estimate what the runs take that `run_plan` would do with the same arguments, without reading a mesh.
 
     The time of a run is the median over finished runs of the same method and backend; else over those of the same
     method; else the limit of a solve, or `ASSUMED_SECONDS` where that is less.
     """
     store = Store(out)
-    runs = [run for spec in plan.pairs() for run in plan_runs(plan, spec, data="")]
+    mine = plan.pairs()[share[0] - 1 :: share[1]]
+    runs = [run for spec in mine for run in plan_runs(plan, spec, data="")]
     known = [store.read_run(path.stem) for path in sorted(store.runs.glob("[!.]*.json"))]
     held = {_key(record) for record in known}
-    done = {run for run in runs if _run_key(run) in held}
+    done = set() if fresh else {run for run in runs if _run_key(run) in held}
     groups: dict[tuple[str, str], list[Run]] = {}
     for run in runs:
         groups.setdefault((run.label, run.backend), []).append(run)

@@ -80,7 +80,7 @@ def read_truth(path: Path | str, full: Mesh, *, expected_rows: int | None = None
         For an unknown suffix, and as the reader of that form does.
     """
     path = Path(path)
-    reader = _READERS.get(path.suffix)
+    reader = _READERS.get(path.suffix.lower())
     if reader is None:
         raise InputError(
             f"no correspondence form has the suffix {path.suffix!r}",
@@ -164,8 +164,6 @@ def _weighted(path: Path, full: Mesh | None, expected_rows: int | None, *, unmat
             row=int(wrong[0]) + 1,
             remedy="name the triangle that the point lies in",
         )
-    weights = np.clip(weights, 0.0, None)
-    weights[~none] /= weights[~none].sum(axis=1, keepdims=True)
     return SurfacePoints(np.where(none, -1, triangle - 1), weights)
 
 
@@ -187,7 +185,7 @@ def _numbers(path: Path, full: Mesh, expected_rows: int | None, *, first: int) -
 
 def _table(path: Path, columns: int, expected_rows: int | None) -> FloatArray:
     try:
-        lines = path.read_text(encoding="utf-8").split("\n")
+        lines = path.read_text(encoding="utf-8-sig").split("\n")
     except FileNotFoundError:
         raise InputError("there is no such file", file=path, remedy="check the path") from None
     except (OSError, UnicodeDecodeError) as error:

@@ -13,7 +13,7 @@ import sys
 import threading
 from typing import Any
 
-from nonrigid.benchmark.task import Task, do_task
+from nonrigid.benchmark.task import Task, WorkerLostError, do_task
 from nonrigid.solvers.confine import follow_parent
 
 _here = threading.local()
@@ -22,7 +22,7 @@ _here = threading.local()
 def in_helper(task: Task) -> None:
     """Do a task in this thread's helper process, started at the first task.
 
-    Raises whatever the task raises, and `RuntimeError` if the helper died.
+    Raises whatever the task raises, and `WorkerLostError` if the helper died.
     """
     helper = getattr(_here, "process", None)
     if helper is None or helper.poll() is not None:
@@ -35,7 +35,7 @@ def in_helper(task: Task) -> None:
         failure = pickle.load(helper.stdout)
     except (OSError, EOFError, pickle.UnpicklingError):
         helper.kill()
-        raise RuntimeError(f"the process beside this worker ended with exit code {helper.wait()}") from None
+        raise WorkerLostError(f"the process beside a worker ended with exit code {helper.wait()}") from None
     if failure is not None:
         raise failure
 

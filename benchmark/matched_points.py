@@ -43,7 +43,8 @@ class MatchedPoints:
     points
         (p,) the points of the full shape that they are matched to.
     errors
-        (p,) geodesic errors on the side that the score chose, fractions of sqrt(full area); None without ground truth.
+        (p,) geodesic errors on the side that the score chose, fractions of sqrt(full area), NaN where a vertex has no
+        ground truth; None where none has.
     functional_map
         The last functional map of the run; None where its method has none.
     """

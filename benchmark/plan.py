@@ -104,7 +104,7 @@ class Plan:
         return [(word if several else "", with_accuracy(self.limits, word)) for word in self.accuracy]
 
 
-def read_plan(path: Path | str, *, data: Path | None = None) -> Plan:
+def read_plan(path: Path | str, *, data: Path | None = None, templates: Path | None = None) -> Plan:
     """Read a plan from a TOML file, or the one of that name that ships with the package.
 
     Parameters
@@ -113,6 +113,8 @@ def read_plan(path: Path | str, *, data: Path | None = None) -> Plan:
         A file, or the name of one that ships with the package, such as "demo".
     data
         Folder of the data set's files; else the plan's `root`, else `$NONRIGID_DATA`, else `../shared/data`.
+    templates
+        Folder or archive of the full shapes, for a plan that names one; else the plan's, taken from the plan's folder.
 
     Raises
     ------
@@ -137,7 +139,7 @@ def read_plan(path: Path | str, *, data: Path | None = None) -> Plan:
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"is not TOML: {error}", file=place, remedy="mend the file at that place") from None
     try:
-        return _plan(table, place, text, data)
+        return _plan(table, place, text, data, templates)
     except InputError as error:
         raise error.at(place) from None
     except NonrigidError as error:
@@ -161,7 +163,7 @@ def dataset_class(word: str) -> Any:
     return known[word]
 
 
-def _plan(table: Mapping[str, Any], place: Path, text: str, data: Path | None) -> Plan:
+def _plan(table: Mapping[str, Any], place: Path, text: str, data: Path | None, templates: Path | None) -> Plan:
     _only(table, _KEYS, "the plan")
     chosen = dict(_get(table, "data", dict))
     word = _get(chosen, "dataset", str, where="[data]")
@@ -184,7 +186,7 @@ def _plan(table: Mapping[str, Any], place: Path, text: str, data: Path | None) -
     return Plan(
         title=str(table.get("title", place.stem)),
         data_word=word,
-        dataset=_dataset(word, chosen, splits, place, data),
+        dataset=_dataset(word, chosen, splits, place, data, templates),
         names=names,
         splits=splits,
         methods=entries,
@@ -200,7 +202,14 @@ def _plan(table: Mapping[str, Any], place: Path, text: str, data: Path | None) -
     )
 
 
-def _dataset(word: str, settings: dict[str, Any], splits: tuple[str, ...], place: Path, data: Path | None) -> Dataset:
+def _dataset(
+    word: str,
+    settings: dict[str, Any],
+    splits: tuple[str, ...],
+    place: Path,
+    data: Path | None,
+    templates: Path | None,
+) -> Dataset:
     kind = dataset_class(word)
     known = {item.name for item in fields(kind)}
     _only(settings, sorted(known - {"names", "splits"}), f"[data] of {word}")
@@ -210,7 +219,7 @@ def _dataset(word: str, settings: dict[str, Any], splits: tuple[str, ...], place
     elif data is not None:
         raise InputError(f"the data set {word} reads no files", remedy="leave out --data")
     if "templates" in known and "templates" in settings:
-        settings["templates"] = place.parent / str(settings["templates"])
+        settings["templates"] = (templates or place.parent / str(settings["templates"])).absolute()
     if splits and "splits" in known:
         settings["splits"] = splits
     plain = {name: value for name, value in settings.items() if name not in ("root", "templates", "splits")}

@@ -20,6 +20,9 @@ from nonrigid.geometry.points import SurfacePoints
 THRESHOLDS: FloatArray = np.linspace(0.0, 0.25, 51)
 """(51,) thresholds of the error curve, 0 to 0.25, in units of sqrt(area of the full shape)."""
 
+ROUNDING = 1e-6
+"""Fraction of sqrt(full area) up to which an error may exceed a threshold and count as within it."""
+
 COVERAGE_RADIUS = 0.1
 """A match covers the part of the surface within this distance, in units of sqrt(area of the full shape)."""
 
@@ -80,6 +83,12 @@ class Score:
     def errors(self) -> FloatArray:
         """(p,) errors on the chosen side."""
         return self.direct if self.mirrored is None or self.side == "direct" else self.mirrored
+
+    def errors_of(self, vertices: IntArray) -> FloatArray:
+        """Return (m,) errors of vertices of the part on the chosen side; NaN where one has no match or no truth."""
+        found = np.full(max(int(np.max(part, initial=-1)) for part in (vertices, self.rows)) + 1, np.nan)
+        found[self.rows] = self.errors
+        return np.asarray(found[vertices])
 
 
 def score(pair: PairData, points: SurfacePoints, *, geodesics: str = "dijkstra") -> Score:
@@ -151,8 +160,8 @@ def curve(errors: FloatArray, thresholds: FloatArray = THRESHOLDS) -> FloatArray
     """
     if not len(errors):
         return np.full(len(thresholds), np.nan)
-    # An error that equals a threshold up to rounding is within it.
-    return np.searchsorted(np.sort(errors), thresholds + 1e-12, side="right") / len(errors)
+    # An error that equals a threshold up to the seven digits of truth files is within it.
+    return np.searchsorted(np.sort(errors), thresholds + ROUNDING, side="right") / len(errors)
 
 
 def coverage(part: Mesh, vertices: IntArray, radius: float) -> float:

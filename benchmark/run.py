@@ -18,12 +18,13 @@ from nonrigid.benchmark.datasets.protocols import PairData
 from nonrigid.benchmark.environment import known_environment, source_digest
 from nonrigid.benchmark.formats import write_corr
 from nonrigid.benchmark.matched_points import matched_points, write_points
-from nonrigid.benchmark.protocol import Score, score
+from nonrigid.benchmark.protocol import COVERAGE_RADIUS, Score, coverage, score
 from nonrigid.benchmark.store import Record, StorageError, Store
 from nonrigid.formulations.formulation import Formulation, Pair, Stages
 from nonrigid.formulations.model import Problem
 from nonrigid.geometry.cache import content_hash
 from nonrigid.geometry.errors import NonrigidError
+from nonrigid.geometry.points import SurfacePoints
 from nonrigid.solvers.backend import backend_class
 from nonrigid.solvers.confine import is_out_of_memory, peak_memory
 from nonrigid.solvers.limits import Limits
@@ -112,8 +113,10 @@ def do_run(run: Run, data: PairData, pair: Pair, store: Store) -> Record:
             errors = None
             if data.truth is not None:
                 result = score(data, points, geodesics=run.metric)
-                errors = result.errors
+                errors = result.errors_of(np.flatnonzero(points.matched))
                 record |= _scored(result)
+            else:
+                record |= _counted(data, points)
             with store.writing():
                 write_corr(store.match_file(run.id), points)
                 write_points(store.points_file(run.id), matched_points(points, errors, found.solutions))
@@ -234,6 +237,18 @@ def _stage(solution: Solution, seen: tuple[int, str | None]) -> Record:
         "versions": dict(solution.versions),
         "attempts": [{**vars(attempt), "status": attempt.status.value} for attempt in solution.attempts],
         "trace": [[p.seconds, p.evaluations, p.objective, p.violation] for p in solution.trace[::step]],
+    }
+
+
+def _counted(data: PairData, points: SurfacePoints) -> Record:
+    """Return what is known of a correspondence without ground truth."""
+    matched = np.flatnonzero(points.matched)
+    radius = COVERAGE_RADIUS * float(np.sqrt(data.full.area))
+    return {
+        "match_count": len(matched),
+        "unmatched_count": len(points) - len(matched),
+        "coverage": coverage(data.part, matched, radius),
+        "kept_area": data.kept_area,
     }
 
 

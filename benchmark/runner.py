@@ -23,6 +23,9 @@ from nonrigid.benchmark.task import Task, WorkerLostError, absolute, data_hash
 from nonrigid.benchmark.terminal import json_text
 from nonrigid.geometry.errors import InputError
 
+_HEADS = ("index.json", "plan.toml", "environment.json", "*.parquet")
+"""What is written into the folder of results itself, each first under a name of its own that begins with a dot."""
+
 ROUNDS = 3
 """How often tasks are handed out again although workers died and no run was finished since."""
 
@@ -57,8 +60,8 @@ def run_plan(
     Raises
     ------
     InputError
-        If a mesh or ground truth of the plan cannot be read, or another benchmark writes to `out`. Whatever goes wrong
-        later is a row of the results.
+        If a mesh or ground truth of the plan cannot be read, two of its methods are the same, or another benchmark
+        writes to `out`. Whatever goes wrong later is a row of the results.
     StorageError
         If results cannot be written; those that are finished are kept.
     WorkerLostError
@@ -71,6 +74,7 @@ def run_plan(
     with _alone(out):
         pairs = [absolute(spec) for spec in plan.pairs()]
         runs = {spec.name: plan_runs(plan, spec) for spec in pairs}
+        _refuse_twins(runs)
         _write_head(plan, store, runs, executor.workers)
         mine = pairs[share[0] - 1 :: share[1]]
         ids = [run.id for spec in mine for run in runs[spec.name]]
@@ -112,6 +116,18 @@ def plan_runs(plan: Plan, spec: PairSpec, *, data: str | None = None) -> list[Ru
     ]
 
 
+def _refuse_twins(runs: Mapping[str, Sequence[Run]]) -> None:
+    """Raise `InputError` where two methods of a plan are the same but for their labels: their runs have one id."""
+    for members in runs.values():
+        labels: dict[str, str] = {}
+        for run in members:
+            if labels.setdefault(run.id, run.label) != run.label:
+                raise InputError(
+                    f"the methods {labels[run.id]!r} and {run.label!r} are the same with the same settings",
+                    remedy="leave one of them out",
+                )
+
+
 def _write_head(plan: Plan, store: Store, runs: Mapping[str, Sequence[Run]], workers: int) -> None:
     labels = {run.id: run.label for members in runs.values() for run in members}
     word, found = known_environment()
@@ -119,9 +135,16 @@ def _write_head(plan: Plan, store: Store, runs: Mapping[str, Sequence[Run]], wor
     with store.writing():
         write_text(store.folder / "plan.toml", plan.text)
         write_text(store.folder / "environment.json", json_text({**found, "jobs": workers}) + "\n")
-    head = {"title": plan.title, "dataset": plan.data_word, "data": plan.dataset.name, "metric": plan.metric}
-    root = getattr(plan.dataset, "root", None)
-    store.write_index({**head, "root": None if root is None else str(Path(root).resolve()), "runs": labels})
+    head: dict[str, object] = {
+        "title": plan.title,
+        "dataset": plan.data_word,
+        "data": plan.dataset.name,
+        "metric": plan.metric,
+    }
+    for name in ("root", "templates"):
+        place = getattr(plan.dataset, name, None)
+        head[name] = None if place is None else str(Path(place).resolve())
+    store.write_index({**head, "runs": labels})
 
 
 def _hand_out(
@@ -163,8 +186,11 @@ def _alone(out: Path) -> Iterator[None]:
                 raise InputError(
                     "another benchmark writes there", file=out, remedy="wait for it, or name another --out"
                 ) from None
-        for folder in (out, out / "runs", out / "matches"):
-            for path in (*folder.glob(".*.*.*"), *folder.glob("*.part")):
+        own = [path for name in _HEADS for path in out.glob(f".{name}.*")]
+        for folder in (out / "runs", out / "matches"):
+            own += [*folder.glob(".*.*.*"), *folder.glob("*.part")]
+        for path in own:
+            if path.is_file():
                 path.unlink(missing_ok=True)
         yield
 

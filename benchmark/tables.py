@@ -123,7 +123,7 @@ def _write(path: Path, columns: Mapping[str, pa.DataType], rows: Sequence[Mappin
         name: pa.array([row.get(name) for row in rows], type=kind, from_pandas=True) for name, kind in columns.items()
     }
     table = pa.table(arrays).replace_schema_metadata({_MARK: str(SCHEMA_VERSION).encode()})
-    handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
     os.close(handle)
     try:
         pq.write_table(table, temporary)

@@ -65,12 +65,16 @@ class UnknownNameError(NonrigidError, KeyError):
     def __init__(self, kind: str, name: str, known: object) -> None:
         self.kind, self.name = kind, name
         choices = sorted(str(choice) for choice in known) if hasattr(known, "__iter__") else [str(known)]
+        self.known = choices
         if len(choices) > _SHOWN:
             near = get_close_matches(name, choices, n=5, cutoff=0.0)
             self.text = f"unknown {kind} {name!r}; choose one of {len(choices)}, such as {', '.join(near)}"
         else:
             self.text = f"unknown {kind} {name!r}; choose one of: {', '.join(choices)}"
         super().__init__(self.text)
+
+    def __reduce__(self) -> tuple[type[UnknownNameError], tuple[str, str, list[str]]]:
+        return type(self), (self.kind, self.name, self.known)
 
     def __str__(self) -> str:
         return self.text

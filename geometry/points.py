@@ -61,7 +61,10 @@ class SurfacePoints:
                 remedy="give points inside their triangles",
             )
         weights = np.clip(weights, 0.0, None)
-        weights[matched] /= weights[matched].sum(axis=1, keepdims=True)
+        # What sums to 1 up to rounding stays, so that points read again are the same to the last bit.
+        total = weights.sum(axis=1, keepdims=True)
+        uneven = matched & (np.abs(total[:, 0] - 1.0) > 4.0 * np.finfo(float).eps)
+        weights[uneven] /= total[uneven]
         numbers.setflags(write=False)
         weights.setflags(write=False)
         object.__setattr__(self, "faces", numbers)

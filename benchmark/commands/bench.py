@@ -48,7 +48,7 @@ def bench_command(
     parts = _share(share)
     read = read_plan(plan, data=data)
     if dry_run:
-        _show_estimate(read, estimate(read, out, workers=jobs), jobs, json)
+        _show_estimate(read, estimate(read, out, workers=jobs, share=parts, fresh=fresh), jobs, json)
         return
     records = run_plan(read, out, executor=doers, share=parts, fresh=fresh, quiet=quiet)
     rows = summary(records)

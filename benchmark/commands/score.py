@@ -117,17 +117,20 @@ def _record(
             PairData(name=name, part=part, full=full, truth=truth, mirrored=mirrored), points, geodesics=metric
         )
         errors, lenient, side = result.errors, result.mean_error_per_point, result.side
+        unknown = result.unknown_count
         kept, covered = result.kept_area, result.coverage
     else:
         errors, lenient, side = _errors(full, points, truth, mirrored, metric)
+        unknown = int((points.matched & ~truth.matched).sum())
     return {
         "name": name,
         "metric": metric,
         "mean_error_x100": 100 * _mean(errors),
         "mean_error_per_point_x100": 100 * lenient,
         "side": side,
-        "matches": len(errors),
-        "unmatched": len(points) - len(errors),
+        "matches": len(errors) + unknown,
+        "unmatched": len(points) - len(errors) - unknown,
+        "without_truth": unknown,
         "coverage": covered,
         "kept_area": kept,
         "curve": curve(errors).tolist(),
@@ -138,12 +141,14 @@ def _errors(
     full: Mesh, points: SurfacePoints, truth: SurfacePoints, mirrored: SurfacePoints | None, metric: str
 ) -> tuple[np.ndarray, float, str]:
     """Return the errors on the better side, the mean of the lesser error at each point, and the side."""
-    rows = np.flatnonzero(points.matched)
+    rows = np.flatnonzero(points.matched & truth.matched)
+    if points.matched.any() and not len(rows):
+        raise InputError("no matched vertex has ground truth", remedy="match vertices that have it")
     image = None if mirrored is None else mirrored[rows]
     both = errors_of_both(full, points[rows], truth[rows], image, geodesics=metric)
     sides = [errors for errors in both if errors is not None]
     if np.isnan(sides).any():
-        raise InputError("a matched vertex has no ground truth", remedy="leave it unmatched")
+        raise InputError("a matched vertex has ground truth on one side only", remedy="complete the ground truth")
     better = int(np.argmin([_mean(errors) for errors in sides])) if len(rows) else 0
     return sides[better], _mean(np.min(sides, axis=0)), ("direct", "mirrored")[better]
 

@@ -39,7 +39,7 @@ def pack_points(
 ) -> dict[str, Any]:
     """Return points of a surface, for the listed vertices of the part or for all of them.
 
-    Weights are rounded to 1/255, errors to `ERROR_STEP` and at most 6.5535.
+    Weights are rounded to 1/255, errors to `ERROR_STEP` and at most 6.5534; one that is not known is the largest number.
     """
     wide = max(int(points.faces.max(initial=0)), 0 if rows is None else int(rows.max(initial=0))) > _SHORT
     whole = np.uint32 if wide else np.uint16
@@ -51,7 +51,8 @@ def pack_points(
     if rows is not None:
         packed["rows"] = _text(rows, whole)
     if errors is not None:
-        packed["errors"] = _text(np.rint(np.clip(errors / ERROR_STEP, 0, _SHORT)), np.uint16)
+        steps = np.rint(np.clip(errors / ERROR_STEP, 0, _SHORT - 1))
+        packed["errors"] = _text(np.where(np.isnan(errors), _SHORT, steps), np.uint16)
     return packed
 
 

@@ -68,7 +68,7 @@ def all_series(records: Sequence[Record]) -> list[Series]:
         hue = labels.index(label) if several else backends.index(backend)
         found.append(
             Series(
-                name=f"{label}, {backend}" if several else backend,
+                name=_legible(f"{label}, {backend}" if several else backend),
                 label=label,
                 backend=backend,
                 records=tuple(members),
@@ -95,6 +95,11 @@ def which(series: Sequence[Series], shown: Sequence[Series]) -> str:
     if len({one.label for one in series}) > 1:
         return f" Each method with its backend of least mean error, {len(shown)} of {len(series)} combinations."
     return f" {len(shown)} of {len(series)} backends found a match."
+
+
+def _legible(name: str) -> str:
+    """Return a name that legends show: they leave out those that begin with an underscore."""
+    return f" {name}" if name.startswith("_") else name
 
 
 def _finite(value: object) -> bool:

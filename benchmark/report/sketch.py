@@ -29,6 +29,7 @@ _STYLE: dict[Any, Any] = {
     "pdf.fonttype": 42,
     "legend.frameon": False,
     "legend.fontsize": 8.5,
+    "text.parse_math": False,  # labels are the users' words
 }
 
 

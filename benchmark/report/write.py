@@ -24,7 +24,7 @@ from nonrigid.benchmark.report.pairs import PairTask, slug, write_pair
 from nonrigid.benchmark.report.series import Series, all_series
 from nonrigid.benchmark.report.sketch import Sketch, save_sketch
 from nonrigid.benchmark.report.table import COLUMNS, EXPLAINED, WIDE, by_method, notes, pair_rows, summary
-from nonrigid.benchmark.store import Record
+from nonrigid.benchmark.store import Record, Store
 from nonrigid.geometry.errors import NonrigidError, UnknownNameError
 
 FIGURES: tuple[Callable[[Sequence[Series]], list[Sketch]], ...] = (
@@ -114,7 +114,9 @@ def draw_figures(out: Path, records: Sequence[Record], only: str | None = None) 
 def pair_specs(folder: Path, data: Path | None = None) -> tuple[dict[str, PairSpec], str]:
     """Return the pairs of a folder's plan by name, and why they cannot be shown where their files are not found."""
     try:
-        return {spec.name: spec for spec in read_plan(folder / "plan.toml", data=data).pairs()}, ""
+        templates = Store(folder).index().get("templates") if (folder / "index.json").is_file() else None
+        plan = read_plan(folder / "plan.toml", data=data, templates=None if templates is None else Path(templates))
+        return {spec.name: spec for spec in plan.pairs()}, ""
     except NonrigidError as failure:
         return {}, f"The surfaces cannot be shown: {failure}. Give their folder: nonrigid report DIR --data FOLDER."
 

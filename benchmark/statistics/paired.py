@@ -39,8 +39,8 @@ def paired_difference(
 ) -> PairedDifference:
     """Compare costs a and b, (n,) each, over the same n pairs; inf or NaN is a failure.
 
-    The interval is the bias-corrected and accelerated bootstrap of the mean difference over pairs, and the difference
-    itself where all are equal or there is one pair only.
+    The interval is the bias-corrected and accelerated bootstrap of the mean difference over pairs, the difference
+    itself where all are equal, and NaN where there is one pair only.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def paired_difference(
 
 
 def _interval(difference: FloatArray, level: float, resamples: int, seed: int) -> tuple[float, float]:
-    if not len(difference):
+    if len(difference) < 2:
         return float("nan"), float("nan")
     # Without spread the acceleration is zero over zero, and every resample has the same mean.
     if np.ptp(difference) <= 1e-12 * max(1.0, float(np.abs(difference).max())):

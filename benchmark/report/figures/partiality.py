@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from typing import Any
@@ -43,7 +44,8 @@ def error_by_missing_area(series: Sequence[Series]) -> list[Sketch]:
     ]
 
     # The panels share one axis, whose limit must not depend on which of them is drawn last.
-    highest = max([row["mean error x100"] for row in rows if row["shapes"]], default=1.0) or 1.0
+    heights = [row["mean error x100"] for row in rows if row["shapes"]]
+    highest = max([height for height in heights if math.isfinite(height)], default=1.0) or 1.0
 
     def draw(figure: Figure) -> None:
         panels = figure.subplots(2, len(splits), sharex=True, sharey=True, squeeze=False)

@@ -8,6 +8,7 @@
   const MIRROR = [86, 180, 233];
   const PICKED = [240, 228, 66];
   const WORST = 0.25;
+  const UNKNOWN = 65535;  // in place of an error: the vertex has no ground truth
   // Cividis, which every colour vision orders alike.
   const SCALE = [[0, 34, 78], [18, 53, 112], [59, 73, 108], [87, 93, 109], [112, 113, 115], [138, 134, 120], [165, 156, 116],
     [195, 179, 105], [225, 204, 85], [254, 232, 56]];
@@ -80,7 +81,10 @@
       const { truth, places } = this;
       const shown = mode === "truth" ? truth : points;
       const sparse = shown && shown.count < this.count / 2;
-      const colour = (i) => (mode === "error" ? shade(shown.errors[i] / 1e4 / WORST) : this.mixed(shown, i, places));
+      const colour = (i) => {
+        if (mode !== "error") return this.mixed(shown, i, places);
+        return shown.errors[i] === UNKNOWN ? GREY : shade(shown.errors[i] / 1e4 / WORST);
+      };
       const [part, full] = [new Uint8Array(3 * this.count), new Uint8Array(this.full.positions.length)];
       for (const colours of [part, full]) for (let i = 0; i < colours.length; i++) colours[i] = GREY[i % 3];
       const dots = [[], []];
@@ -156,17 +160,18 @@
       const marks = [];
       const words = [`Vertex ${vertex}`];
       const i = points ? points.of[vertex] : -1;
-      for (const [known, colour, shape] of [[truth, TRUTH, 1], [mirrored, MIRROR, 2]]) {
-        if (known && known.of[vertex] >= 0) marks.push(mark(this.position(known, known.of[vertex]), colour, shape, 20));
+      const known = i >= 0 && points.errors && points.errors[i] !== UNKNOWN;
+      for (const [side, colour, shape] of [[truth, TRUTH, 1], [mirrored, MIRROR, 2]]) {
+        if (side && side.of[vertex] >= 0) marks.push(mark(this.position(side, side.of[vertex]), colour, shape, 20));
       }
       if (i >= 0) {
         marks.push(mark(this.position(points, i), MATCH, 0, 17));
         words.push(`match in triangle ${points.faces[i]}`);
-        if (truth) words.push(`truth in triangle ${truth.faces[truth.of[vertex]]}`);
-        if (points.errors) words.push(`geodesic error ${NR.cell(points.errors[i] / 100)} x100, to the ${this.side} map`);
+        if (truth && truth.of[vertex] >= 0) words.push(`truth in triangle ${truth.faces[truth.of[vertex]]}`);
+        if (known) words.push(`geodesic error ${NR.cell(points.errors[i] / 100)} x100, to the ${this.side} map`);
       } else words.push("no match in this run");
       this.views[1].points("marks", marks);
-      this.answer = { vertex, matched: i >= 0, error: i >= 0 && points.errors ? points.errors[i] / 1e4 : null, marks: marks.length };
+      this.answer = { vertex, matched: i >= 0, error: known ? points.errors[i] / 1e4 : null, marks: marks.length };
       $("readout").textContent = words.join("; ") + ".";
     }
   }
