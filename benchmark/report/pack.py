@@ -39,7 +39,7 @@ def pack_points(
 ) -> dict[str, Any]:
     """Return points of a surface, for the listed vertices of the part or for all of them.
 
-    Weights are rounded to 1/255, errors to `ERROR_STEP` and at most 6.5534; one that is not known is the largest number.
+    Weights are rounded to 1/255, errors to `ERROR_STEP` and at most 6.5534; 65535 is not known.
     """
     wide = max(int(points.faces.max(initial=0)), 0 if rows is None else int(rows.max(initial=0))) > _SHORT
     whole = np.uint32 if wide else np.uint16

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -45,3 +46,11 @@ def test_a_share_is_written_as_a_fraction(tmp_path: Path, nonrigid: Callable[...
     answer = nonrigid("bench", "demo", "--out", tmp_path, "--share", "3/2")
     assert answer.code == 2
     assert "--share is '3/2'" in answer.err
+
+
+def test_a_dry_run_counts_its_share(tmp_path: Path, nonrigid: Callable[..., Any]) -> None:
+    whole, half = (
+        json.loads(nonrigid("bench", "demo", "--out", tmp_path / "out", "--dry-run", "--json", *more).out)["runs"]
+        for more in ((), ("--share", "1/2"))
+    )
+    assert half == whole // 2

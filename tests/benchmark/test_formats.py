@@ -131,3 +131,14 @@ def test_real_ground_truth_is_read(data: Path) -> None:
     for path in sorted((data / "shrec16" / "holes").glob("*_cat_shape_1*.baryc_gt*")):
         points = read_baryc(path)
         np.testing.assert_allclose(points.barycentric.sum(axis=1), 1.0, atol=1e-12)
+
+
+def test_suffixes_and_marks_of_other_systems_are_read(tmp_path: Path) -> None:
+    (tmp_path / "a.CORR").write_bytes(b"\xef\xbb\xbf1 1 0 0\r\n-1 0 0 0\r\n")
+    assert read_truth(tmp_path / "a.CORR", SQUARE).faces.tolist() == [0, -1]
+
+
+def test_points_read_again_are_the_same_to_the_last_bit() -> None:
+    rng = np.random.default_rng(0)
+    points = SurfacePoints(np.zeros(500, dtype=int), rng.dirichlet([1, 1, 1], 500))
+    assert (points[np.arange(500)].barycentric == points.barycentric).all()

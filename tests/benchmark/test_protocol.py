@@ -365,3 +365,24 @@ def test_the_cat_with_its_doubled_triangles_is_measured(data: Path, metric: str)
     errors = geodesic_errors(cat, a, b, geodesics=metric)
     reference = geodesic_errors(cat, a, b)
     np.testing.assert_allclose(errors, reference, rtol=0.2, atol=0.02)
+
+
+def test_errors_stand_at_their_vertices_where_truth_is_partial() -> None:
+    part = restrict(PLANE, np.arange(len(PLANE.faces)) < 64).mesh
+    count = len(part.vertices)
+    truth = some_points(PLANE, count, 3)
+    known = truth.faces.copy()
+    known[:5] = -1
+    pair = PairData(name="p", part=part, full=PLANE, truth=SurfacePoints(known, truth.barycentric), mirrored=None)
+    wrong = truth.faces.copy()
+    wrong[9] = (wrong[9] + 40) % len(PLANE.faces)
+    result = score(pair, SurfacePoints(wrong, truth.barycentric))
+    errors = result.errors_of(np.arange(count))
+    assert np.isnan(errors[:5]).all()
+    assert int(np.nanargmax(errors)) == 9
+    assert result.unknown_count == 5
+    assert result.curve[0] > 0.9
+
+
+def test_what_is_within_the_digits_of_truth_files_is_within_a_threshold() -> None:
+    assert curve(np.array([5e-8, 0.1]), np.array([0.0])).tolist() == [0.5]

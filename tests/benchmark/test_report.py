@@ -105,7 +105,7 @@ def results(
     index = {"title": "<i>t</i>", "dataset": "creatures", "metric": "dijkstra", "runs": {r["id"]: "x" for r in records}}
     with pytest.MonkeyPatch.context() as patch:
         plan = type("P", (), {"pairs": lambda self: [spec]})()
-        patch.setattr(write, "read_plan", lambda path, data=None: plan)
+        patch.setattr(write, "read_plan", lambda path, data=None, templates=None: plan)
         write_report(folder, index, with_gaps(records))
     (folder / "records.json").write_text(json.dumps(records))
     return folder
@@ -279,11 +279,11 @@ def test_colours_follow_places_and_the_view_is_a_rotation(person: PairData) -> N
 
 
 def test_large_surfaces_are_packed_wide(person: PairData) -> None:
-    points = SurfacePoints([70_000], [[0.2, 0.3, 0.5]])
-    block = pack_points(points, np.array([3]), np.array([np.inf]))
+    points = SurfacePoints([70_000, 0], [[0.2, 0.3, 0.5], [1.0, 0.0, 0.0]])
+    block = pack_points(points, np.array([3, 4]), np.array([np.inf, np.nan]))
     assert block["wide"]
-    assert unpacked(block["faces"], "<u4").tolist() == [70_000]
-    assert unpacked(block["errors"], "<u2").tolist() == [65535]
+    assert unpacked(block["faces"], "<u4").tolist() == [70_000, 0]
+    assert unpacked(block["errors"], "<u2").tolist() == [65534, 65535]
     assert not pack_surface(person.part)["wide"]
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from nonrigid.benchmark.aggregate import scored_rows
 from nonrigid.benchmark.plan import Plan, read_plan
 from nonrigid.benchmark.report.table import refusals, summary
 from nonrigid.benchmark.report.write import write_report
@@ -213,3 +215,38 @@ def test_a_file_that_is_no_index_is_refused(tmp_path: Path) -> None:
     (tmp_path / "index.json").write_text("[]")
     with pytest.raises(InputError, match=r"index\.json: is no index of results; repeat"):
         Store(tmp_path).index()
+
+
+def test_methods_that_are_the_same_are_refused(tmp_path: Path) -> None:
+    twin = TEXT + '[[methods]]\nmethod = "gt"\nlabel = "twin"\nsettings = { part_samples = 30, full_samples = 150, '
+    (tmp_path / "twin.toml").write_text(twin + "per_sample = 5, groups = 1 }\n")
+    with pytest.raises(InputError, match="the methods 'gt' and 'twin' are the same with the same settings; leave one"):
+        run_plan(read_plan(tmp_path / "twin.toml"), tmp_path / "out", quiet=True)
+
+
+def test_files_of_others_in_the_folder_stay(plan: Plan, results: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    shutil.copytree(results, out)
+    for name in (".s0.toml.swp", ".my.notes.txt", "thesis.part"):
+        (out / name).write_text("mine")
+    (out / ".a.b.c").mkdir()
+    (out / ".index.json.x1").write_text("half")
+    (out / "runs" / ".0.json.x1").write_text("half")
+    run_plan(plan, out, quiet=True)
+    assert all((out / name).exists() for name in (".s0.toml.swp", ".my.notes.txt", "thesis.part", ".a.b.c"))
+    assert not (out / ".index.json.x1").exists()
+    assert not (out / "runs" / ".0.json.x1").exists()
+
+
+def test_matches_without_truth_are_counted(plan: Plan, tmp_path: Path) -> None:
+    spec = replace(plan.pairs()[0], truth=None, mirrored=None)
+    run = plan_runs(plan, spec)[0]
+    store = Store(tmp_path)
+    store.prepare()
+    data = spec.load()
+    record = do_run(run, data, Pair.of(data.part, data.full), store)
+    assert record["match_count"] > 0
+    assert record.get("mean_error") is None
+    assert summary([record])[0]["pairs"] == "1/1"
+    assert not refusals([record])
+    assert not scored_rows([record])

@@ -139,3 +139,9 @@ def test_the_interval_covers_the_truth_about_as_often_as_it_says() -> None:
         found = paired_difference(generator.normal(1.0, 1.0, 40), np.zeros(40), resamples=400, seed=seed)
         inside += found.low <= 1.0 <= found.high
     assert 86 <= inside <= 100
+
+
+def test_one_pair_has_no_interval() -> None:
+    found = paired_difference([1.0], [0.5])
+    assert found.mean == 0.5
+    assert np.isnan([found.low, found.high]).all()
