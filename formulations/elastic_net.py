@@ -28,7 +28,8 @@ class ElasticNetMatching(GameSettings):
         Weight of the squared 2-norm, in [0, 1].
     floor
         Share, relative to the largest, down to which candidates are read out.
-    kernel_width, part_samples, full_samples, per_sample, radii, sides, excess_weight, local_candidates, local_reach
+    kernel_width, part_samples, full_samples, per_sample, radii, sides, excess_weight, geodesics, local_candidates,
+    local_reach
         See `nonrigid.formulations.games.GameSettings`.
 
     Source: Rodola, Torsello, Harada, Kuniyoshi and Cremers, elastic net constraints for shape matching (ICCV 2013);

@@ -39,7 +39,8 @@ class GameTheoretic(GameSettings):
         A group is kept while x'Ax / (1 - 1/m), its mean payoff, is at least this share of the first group's.
     agreement
         Mean payoff between two groups at which they may be merged.
-    kernel_width, part_samples, full_samples, per_sample, radii, sides, excess_weight, local_candidates, local_reach
+    kernel_width, part_samples, full_samples, per_sample, radii, sides, excess_weight, geodesics, local_candidates,
+    local_reach
         See `nonrigid.formulations.games.GameSettings`.
 
     Source: Rodola, Bronstein, Albarelli, Bergamasco and Torsello, a game-theoretic approach to deformable shape

@@ -16,9 +16,10 @@ from nonrigid.geometry.mesh import Mesh
 from nonrigid.geometry.tosca_forms import read_mat, read_vert_tri
 
 _Row = tuple[int, str]
+"""A line's 1-based number in its file, and its text without comments."""
 
 _LARGEST_NUMBER = 2**62
-"""A line's 1-based number in its file, and its text without comments."""
+"""What stands for a vertex number that does not fit into 64 bits."""
 
 
 def read_mesh(path: str | PathLike[str]) -> Mesh:

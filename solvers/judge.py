@@ -46,8 +46,9 @@ def judge(problem: Problem, values: Values) -> Judgement:
     set has only a projection, see `_projected_residual`; where named constraints stand in the problem, the largest
     entry of a KKT residual with multipliers by least squares (an upper bound of the smallest one).
 
-    On a surface that is not convex, and up which no objective pushes, a local optimum has a gap over the convex hull:
-    there the largest slope along the surface counts, if that is less.
+    On a surface that is not convex, under an objective that is not affine, a local optimum may have a gap over the
+    convex hull: there the largest slope along the surface counts, if that is less; on an elastic net only where the
+    gradient does not point outward.
     """
     point = restore(problem, values)
     objective, gradient = problem.objective.value_and_gradient(point)

@@ -10,6 +10,7 @@ import numpy as np
 from nonrigid.benchmark.datasets.archive import Archive
 from nonrigid.benchmark.datasets.copies import Signature, find_copies, in_own_pose, signature
 from nonrigid.benchmark.datasets.protocols import PairData
+from nonrigid.formulations.formulation import LARGEST_PART, SMALLEST_PART
 from nonrigid.geometry.clean import clean
 from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.points import SurfacePoints
@@ -48,9 +49,9 @@ def check_archive(
     """Read every file of a data set and return what is wrong with it; nothing is passed over because of another fault.
 
     Faults: files that a pair lacks; files that cannot be read, with their row; meshes that cannot be repaired; parts
-    larger than the full shape; ground truth that tears the surface, as that of another shape does, or one whose
-    triangles are numbered from 0. Leaks: parts in the full shape's own pose and frame; shapes that are there twice, or
-    also in `against`.
+    larger than the full shape, or hardly there; ground truth that tears the surface, as that of another shape does, or
+    one whose triangles are numbered from 0. Leaks: parts in the full shape's own pose and frame; shapes that are there
+    twice, or also in `against`.
 
     Parameters
     ----------
@@ -100,7 +101,7 @@ def check_pair(data: PairData, *, with_full: bool = True) -> list[Finding]:
             clean(mesh)
         except InputError as error:
             findings.append(_from_error("fault", mesh.source, error))
-    if data.kept_area > 1.1 and data.metadata.get("split") != "full":
+    if not SMALLEST_PART <= data.kept_area <= LARGEST_PART and data.metadata.get("split") != "full":
         findings.append(
             Finding(
                 kind="fault",

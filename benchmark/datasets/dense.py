@@ -41,7 +41,7 @@ class DenseClass:
     files
         The template and its poses. Vertices correspond by number; the template's triangles serve for all.
     vertices
-        Vertices of each remeshed shape; a dense mesh that has no more stays as dense as it is.
+        Vertices of each remeshed shape; a dense mesh that has hardly more is brought to nine tenths of its own.
     seed
         For the numbering.
 

@@ -45,7 +45,9 @@ class Set(Protocol):
 
     Optional members, used where present and checked by `nonrigid.solvers.testing.check_set`: `project(x)`, the nearest
     point of the set; `linear_max(g)`, the point of the set with the largest inner product with g;
-    `gauge_and_gradient(x)`, for sets {x >= 0, gauge(x) = 1}; `body()`, the convex set whose surface this is;
+    `slope_along(x, g)`, of a surface that is not convex, the largest entry of g along it, None where the gap over its
+    hull tells all; `gauge_and_gradient(x)`, for sets {x >= 0, gauge(x) = 1}; `body()`, the convex set whose surface
+    this is;
     `lower(x, ops)`, a list of constraints in the operations of a symbolic backend.
     """
 

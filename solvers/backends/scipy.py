@@ -115,7 +115,8 @@ class Scipy:
 def _options(algorithm: str, limits: Limits) -> dict[str, Any]:
     tight = 0.1 * limits.tolerance
     if algorithm == "L-BFGS-B":
-        return {"gtol": tight, "ftol": 0.0, "maxiter": _UNBOUNDED, "maxfun": _UNBOUNDED, "maxcor": 20}
+        # On rays gradients are smaller than on the surface, by the length of the point.
+        return {"gtol": 0.1 * tight, "ftol": 0.0, "maxiter": _UNBOUNDED, "maxfun": _UNBOUNDED, "maxcor": 20}
     if algorithm == "SLSQP":
         return {"ftol": max(1e-3 * limits.tolerance**2, 1e-15), "maxiter": _UNBOUNDED, "disp": limits.verbose}
     # Its gradient test does not look at complementarity, so it stops far from the bounds: only the radius may stop it.

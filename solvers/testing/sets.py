@@ -47,6 +47,8 @@ def check_set(set: Any, shape: int | tuple[int, ...], *, rng_seed: int = 0, poin
         _check_project(set, full, members, outside)
     if hasattr(set, "linear_max"):
         _check_linear_max(set, members, outside)
+    if hasattr(set, "slope_along"):
+        _check_slope_along(set, full, outside)
     if hasattr(set, "gauge_and_gradient"):
         _check_gauge(set, members, rng)
     if hasattr(set, "body"):
@@ -181,6 +183,25 @@ def _check_project(set_: Any, shape: tuple[int, ...], members: list[FloatArray],
             found=f"a residual of {residual:.3g}",
             look="project",
         )
+
+
+def _check_slope_along(set_: Any, shape: tuple[int, ...], outside: list[FloatArray]) -> None:
+    """Check that the slope toward a point is none at the nearest point to it, and some beside it."""
+    for target in outside:
+        nearest = set_.project(target)
+        reached = max(float(np.linalg.norm(target - nearest)), 1.0)
+        slope = set_.slope_along(nearest, target - nearest)
+        at_end = hasattr(set_, "body") and set_.violation(set_.body().project(target)) > _ON
+        expect(
+            at_end or slope is None or slope <= 1e-7 * reached,
+            set_,
+            expected="no slope along the surface toward a point at the nearest point to it",
+            found=slope,
+            look="slope_along",
+        )
+        for other in (set_.center(shape), set_.sample(shape, np.random.default_rng(0))):
+            slope = set_.slope_along(other, target - other)
+            expect(slope is None or slope >= 0.0, set_, expected="None or a length", found=slope, look="slope_along")
 
 
 def _check_linear_max(set_: Any, members: list[FloatArray], outside: list[FloatArray]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import shutil
 import signal
@@ -205,11 +206,15 @@ def test_an_interrupted_benchmark_says_what_is_kept(tmp_path: Path) -> None:
     code += "from nonrigid.benchmark.cli import main; main()"
     words = [sys.executable, "-c", code, "bench", "demo", "--out", "results"]
     child = subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True)
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + 100.0
     while not (tmp_path / "results" / "index.json").exists() and time.monotonic() < deadline:
         time.sleep(0.05)
-    child.send_signal(signal.SIGINT)
-    heard = child.communicate(timeout=60)[1]
+    heard = ""
+    while not heard and time.monotonic() < deadline:
+        # Once may not be enough: a library that is just being cleared away swallows what is raised there.
+        child.send_signal(signal.SIGINT)
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            heard = child.communicate(timeout=8)[1]
     assert child.returncode == 130
     assert heard.splitlines()[-1] == "nonrigid: interrupted; finished runs are kept"
 
