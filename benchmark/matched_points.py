@@ -13,6 +13,7 @@ from zipfile import BadZipFile
 
 import numpy as np
 
+from nonrigid.benchmark.protocol import Score
 from nonrigid.geometry.arrays import FloatArray, IntArray
 from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.points import SurfacePoints
@@ -56,17 +57,18 @@ class MatchedPoints:
 
 
 def matched_points(
-    dense: SurfacePoints, errors: FloatArray | None = None, solutions: Sequence[Valued] = ()
+    dense: SurfacePoints, scored: Score | None = None, solutions: Sequence[Valued] = ()
 ) -> MatchedPoints:
-    """Return the matches among one point a vertex of the part; `errors` has one number a match.
+    """Return the matches among one point a vertex of the part, with their errors where they were scored.
 
     Examples
     --------
-    >>> found = matched_points(SurfacePoints([-1, 4], [[0, 0, 0], [1, 0, 0]]), np.array([0.1]))
+    >>> found = matched_points(SurfacePoints([-1, 4], [[0, 0, 0], [1, 0, 0]]))
     >>> found.rows, found.points.faces
     (array([1]), array([4]))
     """
     rows = np.flatnonzero(dense.matched)
+    errors = None if scored is None else scored.errors_of(rows)
     return MatchedPoints(rows=rows, points=dense[rows], errors=errors, functional_map=_functional_map(solutions))
 
 

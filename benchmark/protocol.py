@@ -144,7 +144,7 @@ def score(pair: PairData, points: SurfacePoints, *, geodesics: str = "dijkstra")
         match_count=int(points.matched.sum()),
         unmatched_count=int((~points.matched).sum()),
         unknown_count=int((points.matched & ~pair.truth.matched).sum()),
-        coverage=coverage(pair.part, np.flatnonzero(points.matched), COVERAGE_RADIUS * np.sqrt(pair.full.area)),
+        coverage=covered(pair, points),
         curve=curve(chosen),
         kept_area=pair.kept_area,
     )
@@ -162,6 +162,11 @@ def curve(errors: FloatArray, thresholds: FloatArray = THRESHOLDS) -> FloatArray
         return np.full(len(thresholds), np.nan)
     # An error that equals a threshold up to the seven digits of truth files is within it.
     return np.searchsorted(np.sort(errors), thresholds + ROUNDING, side="right") / len(errors)
+
+
+def covered(pair: PairData, points: SurfacePoints) -> float:
+    """Return the fraction of the part's area within `COVERAGE_RADIUS` of a match; `points` has one row a vertex."""
+    return coverage(pair.part, np.flatnonzero(points.matched), COVERAGE_RADIUS * float(np.sqrt(pair.full.area)))
 
 
 def coverage(part: Mesh, vertices: IntArray, radius: float) -> float:

@@ -18,7 +18,7 @@ from nonrigid.benchmark.datasets.protocols import PairData
 from nonrigid.benchmark.environment import known_environment, source_digest
 from nonrigid.benchmark.formats import write_corr
 from nonrigid.benchmark.matched_points import matched_points, write_points
-from nonrigid.benchmark.protocol import COVERAGE_RADIUS, Score, coverage, score
+from nonrigid.benchmark.protocol import Score, covered, score
 from nonrigid.benchmark.store import Record, StorageError, Store
 from nonrigid.formulations.formulation import Formulation, Pair, Stages
 from nonrigid.formulations.model import Problem
@@ -110,16 +110,11 @@ def do_run(run: Run, data: PairData, pair: Pair, store: Store) -> Record:
             record |= {name: first[name] for name in (*names, "objective", "violation", "stationarity", "bound")}
         if found.correspondence is not None:
             points = found.correspondence.dense(len(data.part.vertices))
-            errors = None
-            if data.truth is not None:
-                result = score(data, points, geodesics=run.metric)
-                errors = result.errors_of(np.flatnonzero(points.matched))
-                record |= _scored(result)
-            else:
-                record |= _counted(data, points)
+            scored = None if data.truth is None else score(data, points, geodesics=run.metric)
+            record |= _counted(data, points) if scored is None else _scored(scored)
             with store.writing():
                 write_corr(store.match_file(run.id), points)
-                write_points(store.points_file(run.id), matched_points(points, errors, found.solutions))
+                write_points(store.points_file(run.id), matched_points(points, scored, found.solutions))
     except StorageError:
         raise
     except Exception as failure:
@@ -242,12 +237,11 @@ def _stage(solution: Solution, seen: tuple[int, str | None]) -> Record:
 
 def _counted(data: PairData, points: SurfacePoints) -> Record:
     """Return what is known of a correspondence without ground truth."""
-    matched = np.flatnonzero(points.matched)
-    radius = COVERAGE_RADIUS * float(np.sqrt(data.full.area))
+    count = int(points.matched.sum())
     return {
-        "match_count": len(matched),
-        "unmatched_count": len(points) - len(matched),
-        "coverage": coverage(data.part, matched, radius),
+        "match_count": count,
+        "unmatched_count": len(points) - count,
+        "coverage": covered(data, points),
         "kept_area": data.kept_area,
     }
 

@@ -210,7 +210,7 @@ class Anchored:
 
     def stages(self, pair: Pair) -> Stages:
         """State the game, then one map a step; return one point a vertex of the part."""
-        check_ranges(self, _RANGES)
+        check_ranges(vars(self), _RANGES)
         descriptors = trusted_descriptors(pair, self.radii, power=self.trust_power)
         along = sampled_distances(
             pair,

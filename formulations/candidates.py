@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from nonrigid.formulations.formulation import Pair
+from nonrigid.formulations.ranges import COUNT, check_ranges
 from nonrigid.geometry.arrays import BoolArray, FloatArray, IntArray
 from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.maps import nearest_rows
@@ -131,9 +132,8 @@ def candidate_matches(
     Source: pre-selection by descriptor in Rodola, Bronstein, Albarelli, Bergamasco and Torsello (CVPR 2012), with
     SHOT in place of heat kernels, which parts disturb near their boundary.
     """
-    for name, value in (("part_samples", part_samples), ("full_samples", full_samples), ("per_sample", per_sample)):
-        if value < 1:
-            raise InputError(f"{name} is {value}", remedy="give a number of at least 1")
+    counts = {"part_samples": part_samples, "full_samples": full_samples, "per_sample": per_sample}
+    check_ranges(counts, dict.fromkeys(counts, COUNT))
     require_descriptors(pair, radii)
     some = pair.part.samples(min(part_samples, len(pair.part.mesh.vertices)))
     others = pair.full.samples(min(full_samples, len(pair.full.mesh.vertices)))

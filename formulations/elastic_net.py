@@ -48,7 +48,7 @@ class ElasticNetMatching(GameSettings):
 
     def stages(self, pair: Pair) -> Stages:
         """State the problem on the candidates, then on those around its matches; read the matches out."""
-        check_ranges(self, {"mix": SHARE, "floor": BELOW_ONE})
+        check_ranges(vars(self), {"mix": SHARE, "floor": BELOW_ONE})
         matches = players(self, pair)
         surface = ElasticNet(mix=self.mix)
         share = (yield game("elastic-net", payoffs(self, pair, matches, keep=True), surface))["u"]

@@ -21,7 +21,6 @@ from nonrigid.geometry.surface import Surface
 LARGEST_PART = 1.1
 """Area of a part, in units of the full area, above which a pair is refused: poses stretch areas by a few per cent."""
 
-
 SMALLEST_PART = 1e-3
 """Area of a part, in units of the full area, below which a pair is refused: mostly its unit of length is another."""
 

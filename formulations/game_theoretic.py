@@ -60,7 +60,7 @@ class GameTheoretic(GameSettings):
 
     def stages(self, pair: Pair) -> Stages:
         """State the game (once a peeled group), then the local game; return one match a surviving sample."""
-        check_ranges(self, {"groups": COUNT, "group_quality": SHARE, "agreement": SHARE})
+        check_ranges(vars(self), {"groups": COUNT, "group_quality": SHARE, "agreement": SHARE})
         matches = players(self, pair)
         share = yield from self._play("game", pair, matches, groups=self.groups)
         if self.local_candidates:

@@ -11,7 +11,7 @@ from nonrigid.formulations.distortion import Sides, consistency
 from nonrigid.formulations.formulation import Correspondence, Pair
 from nonrigid.formulations.localisation import local_matches
 from nonrigid.formulations.model import Problem, QuadraticForm, Set, Variable, maximize
-from nonrigid.formulations.ranges import COUNT, COUNT_OR_NONE, NOT_NEGATIVE, POSITIVE, SHARE, check_ranges
+from nonrigid.formulations.ranges import COUNT_OR_NONE, NOT_NEGATIVE, POSITIVE, SHARE, check_ranges
 from nonrigid.geometry.arrays import FloatArray
 
 
@@ -49,7 +49,6 @@ class GameSettings:
 
 
 _RANGES = {
-    **dict.fromkeys(("part_samples", "full_samples", "per_sample"), COUNT),
     **dict.fromkeys(("kernel_width", "radii"), POSITIVE),
     "local_candidates": COUNT_OR_NONE,
     "local_reach": NOT_NEGATIVE,
@@ -67,7 +66,7 @@ def players(settings: GameSettings, pair: Pair) -> Candidates:
     InputError
         If a setting is out of range, or most vertices have no descriptor.
     """
-    check_ranges(settings, _RANGES)
+    check_ranges(vars(settings), _RANGES)
     matches = candidate_matches(
         pair,
         part_samples=settings.part_samples,

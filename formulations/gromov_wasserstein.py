@@ -82,7 +82,7 @@ class PartialGromovWasserstein(GrowthSettings):
             if not (np.isfinite(weight) and weight >= 0.0):
                 raise InputError(f"a look weight is {weight}", remedy="give a number that is not negative")
         self.check()
-        check_ranges(self, {"part_samples": COUNT, "full_samples": COUNT})
+        check_ranges(vars(self), {"part_samples": COUNT, "full_samples": COUNT})
         descriptors = trusted_descriptors(pair, self.radii, power=self.trust_power)
         samples = sampled_distances(
             pair,

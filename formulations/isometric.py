@@ -102,7 +102,7 @@ class IsometricMatching:
                 f"sources is {self.sources}, part_samples {self.part_samples}, full_samples {self.full_samples}",
                 remedy="map at least 3 sources, and no more than there are samples on either surface",
             )
-        check_ranges(self, {"matches": COUNT, "per_sample": COUNT, "kept": ABOVE_NONE})
+        check_ranges(vars(self), {"matches": COUNT, "per_sample": COUNT, "kept": ABOVE_NONE})
         if self.extension_samples < self.matches:
             raise InputError(
                 f"extension_samples is {self.extension_samples} and matches {self.matches}",

@@ -174,7 +174,7 @@ class PartialFunctionalMap:
     def _check(self) -> None:
         if self.start not in _STARTS:
             raise UnknownNameError("start", self.start, _STARTS)
-        check_ranges(self, _RANGES)
+        check_ranges(vars(self), _RANGES)
         if self.start in ("several", "descriptors") and not self.start_radii:
             raise InputError(f"start_radii is empty and start {self.start!r}", remedy="give a radius, such as 0.1")
 

@@ -70,7 +70,7 @@ class GrowthSettings:
 
     def check(self) -> None:
         """Raise `InputError` for a setting that is out of range."""
-        check_ranges(self, _RANGES)
+        check_ranges(vars(self), _RANGES)
 
 
 @dataclass(frozen=True, kw_only=True)

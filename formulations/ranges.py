@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import inf
+from typing import Any
 
 from nonrigid.geometry.errors import InputError
 
@@ -24,26 +25,25 @@ COUNT: Range = (1, inf)
 COUNT_OR_NONE: Range = (0, inf)
 
 
-def check_ranges(settings: object, ranges: Mapping[str, Range]) -> None:
+def check_ranges(settings: Mapping[str, Any], ranges: Mapping[str, Range]) -> None:
     """Raise `InputError` for the first setting that is not in its range; of a tuple, every entry has to be.
 
     Parameters
     ----------
     settings
-        Has an attribute for each name.
+        Name -> number or tuple of numbers; others than those of `ranges` are not looked at.
     ranges
-        Least and largest value of each setting.
+        Least and largest value of each setting, in its own unit.
 
     Examples
     --------
-    >>> from types import SimpleNamespace
-    >>> check_ranges(SimpleNamespace(rounds=3, radii=(0.04, 0.10)), {"rounds": COUNT, "radii": POSITIVE})
-    >>> check_ranges(SimpleNamespace(kept=1.5), {"kept": SHARE})
+    >>> check_ranges({"rounds": 3, "radii": (0.04, 0.10)}, {"rounds": COUNT, "radii": POSITIVE})
+    >>> check_ranges({"kept": 1.5}, {"kept": SHARE})
     Traceback (most recent call last):
     nonrigid.geometry.errors.InputError: kept is 1.5; give a number from 0 to 1
     """
     for name, (least, most) in ranges.items():
-        given = getattr(settings, name)
+        given = settings[name]
         if given == ():
             raise InputError(f"{name} is empty", remedy="give at least one number")
         for value in given if isinstance(given, tuple) else (given,):

@@ -15,7 +15,7 @@ _Array = TypeVar("_Array", bound=NDArray[Any])
 
 
 def frozen(array: _Array) -> _Array:
-    """Return the same array, from now on read-only.
+    """Return the same array, of any shape, from now on read-only.
 
     Examples
     --------

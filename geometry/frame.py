@@ -66,6 +66,17 @@ def canonical_priority(mesh: Mesh) -> FloatArray:
 
 
 def farthest(distances: FloatArray, priority: FloatArray) -> int:
-    """Return the number of the largest distance; of those within `TIE` of it, the one with the largest priority."""
+    """Return the number of the largest distance; of those within `TIE` of it, relatively, that of largest priority.
+
+    Parameters
+    ----------
+    distances, priority
+        (n,) each, n at least 1: lengths in one unit, and what settles ties, such as `canonical_priority`.
+
+    Examples
+    --------
+    >>> farthest(np.array([2.0, 1.0, 2.0 + 1e-12]), np.array([0.5, 0.9, 0.1]))
+    0
+    """
     tied = np.flatnonzero(distances >= (1.0 - TIE) * distances.max())
     return int(tied[np.argmax(priority[tied])])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from nonrigid.geometry.arrays import BoolArray, FloatArray, IntArray
+from nonrigid.geometry.arrays import BoolArray, FloatArray, IntArray, frozen
 from nonrigid.geometry.errors import InputError
 from nonrigid.geometry.mesh import Mesh
 
@@ -65,10 +65,8 @@ class SurfacePoints:
         total = weights.sum(axis=1, keepdims=True)
         uneven = matched & (np.abs(total[:, 0] - 1.0) > 4.0 * np.finfo(float).eps)
         weights[uneven] /= total[uneven]
-        numbers.setflags(write=False)
-        weights.setflags(write=False)
-        object.__setattr__(self, "faces", numbers)
-        object.__setattr__(self, "barycentric", weights)
+        object.__setattr__(self, "faces", frozen(numbers))
+        object.__setattr__(self, "barycentric", frozen(weights))
 
     def __len__(self) -> int:
         return len(self.faces)

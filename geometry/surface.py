@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
+from operator import index
 from typing import Any, Literal, TypeAlias, TypeVar
 
 import numpy as np
@@ -100,7 +101,7 @@ class Surface:
 
         Where a symmetry of the surface leaves the sign of an eigenfunction open, `canonical_priority` decides it.
         """
-        k = int(k)
+        k = index(k)
 
         def fresh() -> dict[str, FloatArray]:
             made = spectrum(self.laplacian(kind), k, reference=canonical_priority(self.mesh))
@@ -138,7 +139,7 @@ class Surface:
 
     def samples(self, count: int, metric: Literal["euclidean", "geodesic"] = "euclidean") -> IntArray:
         """Return `count` vertices far from one another; see `nonrigid.geometry.sampling.farthest_points`."""
-        count = int(count)
+        count = index(count)
         key = ("samples", count, metric)
 
         def fresh() -> dict[str, IntArray]:

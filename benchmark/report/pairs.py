@@ -11,8 +11,6 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from nonrigid.benchmark.datasets.files import load_mesh
 from nonrigid.benchmark.datasets.protocols import MeshSource, PairData, PairSpec
 from nonrigid.benchmark.formats import read_corr, write_text
@@ -169,11 +167,7 @@ def _matches(record: Record, store: Store, data: PairData) -> MatchedPoints | No
         return None
     # Results of before errors were kept: the same score is taken again.
     points = read_corr(written, full=data.full, expected_rows=len(data.part.vertices))
-    errors = None
-    if data.truth is not None:
-        matched = np.flatnonzero(points.matched)
-        errors = score(data, points, geodesics=record["metric"]).errors_of(matched)
-    return matched_points(points, errors)
+    return matched_points(points, None if data.truth is None else score(data, points, geodesics=record["metric"]))
 
 
 def _thinned(trace: Sequence[Sequence[float | None]]) -> list[Sequence[float | None]]:

@@ -48,7 +48,7 @@ def write_match_page(path: Path, pair: PairData, points: SurfacePoints, found: S
     found
         Its score, for the errors.
     """
-    matches = matched_points(points, None if found is None else found.errors_of(np.flatnonzero(points.matched)))
+    matches = matched_points(points, found)
     run = {
         "id": "match",
         "label": path.stem,

@@ -118,7 +118,7 @@ class ElasticNet:
         return self.restore(np.maximum(x - multiplier[within[-1]] * linear, 0.0))
 
     def slope_along(self, x: FloatArray, ascent: FloatArray) -> float | None:
-        """Return the largest entry of the ascent along the surface; None where it pushes outward, off the body.
+        """Return the largest entry of the ascent (n,) along the surface at x (n,); None where it pushes off the body.
 
         Entries can fall to 0 and no further.
         """

@@ -48,7 +48,10 @@ class Stiefel:
     linear_max = project
 
     def slope_along(self, x: FloatArray, ascent: FloatArray) -> float:
-        """Return the largest entry of the ascent along the manifold, G - C sym(C'G)."""
+        """Return the largest entry of the ascent along the manifold, G - C sym(C'G), of a point C and ascent G (k, r).
+
+        Source: Edelman, Arias and Smith, the geometry of algorithms with orthogonality constraints (SIMAX 1998).
+        """
         inner = x.T @ ascent
         return float(np.abs(ascent - x @ (0.5 * (inner + inner.T))).max(initial=0.0))
 

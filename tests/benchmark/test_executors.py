@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import json
+import pickle
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from nonrigid.benchmark import helper
 from nonrigid.benchmark.executors import Dask, Executor, InProcess, Joblib, make_executor
+from nonrigid.benchmark.task import WorkerLostError
 from nonrigid.geometry.errors import InputError, UnknownNameError
 
 
@@ -54,3 +59,17 @@ def test_a_dry_run_counts_its_share(tmp_path: Path, nonrigid: Callable[..., Any]
         for more in ((), ("--share", "1/2"))
     )
     assert half == whole // 2
+
+
+def test_a_lost_helper_is_a_lost_worker(monkeypatch: pytest.MonkeyPatch) -> None:
+    gone = subprocess.Popen(
+        [sys.executable, "-c", "import sys; sys.stdin.read(1)"], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    )
+    monkeypatch.setattr(helper._here, "process", gone, raising=False)
+    with pytest.raises(WorkerLostError, match="the process beside a worker ended"):
+        helper.in_helper("a task")  # type: ignore[arg-type]
+
+
+def test_errors_travel_between_processes() -> None:
+    error = UnknownNameError("backend", "nlop", ["native", "nlopt"])
+    assert str(pickle.loads(pickle.dumps(error))) == str(error)

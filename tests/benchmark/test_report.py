@@ -8,6 +8,7 @@ import json
 import re
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -98,7 +99,7 @@ def results(
                 record = made_up(pair, label, backend, base * share, seconds, found)
                 functional = type("S", (), {"values": {MAP_VARIABLE: np.eye(3)}})()
                 solutions = [functional] if label == "pfm" else []
-                write_points(store.points_file(record["id"]), matched_points(answer, found.errors, solutions))
+                write_points(store.points_file(record["id"]), matched_points(answer, found, solutions))
                 records.append(record)
     lost = made_up(HOSTILE, "gt", "casadi", 0.0, 0.0, None, status="refused", message="too <large>", stages=[])
     records += [lost, {**lost, "pair": "holes_second", "id": "lost2"}]
@@ -250,7 +251,7 @@ def test_older_results_are_scored_again(
 def test_stored_matches_come_back(answers: dict[str, SurfacePoints], tmp_path: Path) -> None:
     sparse = answers["sparse"]
     errors = np.linspace(0, 1, int(sparse.matched.sum()))
-    write_points(tmp_path / "a.npz", matched_points(sparse, errors))
+    write_points(tmp_path / "a.npz", replace(matched_points(sparse), errors=errors))
     back = read_points(tmp_path / "a.npz")
     assert (back.points.faces == sparse.faces[back.rows]).all()
     assert back.errors == pytest.approx(errors, abs=1e-7)

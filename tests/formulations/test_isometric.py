@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from nonrigid.benchmark.datasets.shrec16 import Shrec16
 from nonrigid.formulations.formulation import Pair
@@ -15,6 +16,7 @@ from nonrigid.formulations.model.assignment_sets import PartialPermutation, chea
 from nonrigid.formulations.model.terms.triple_distortion import TripleDistortion
 from nonrigid.geometry.arrays import FloatArray
 from nonrigid.geometry.errors import InputError
+from nonrigid.geometry.mesh import Mesh
 from nonrigid.solvers.bounds.bound import bound
 from nonrigid.solvers.match import match
 from nonrigid.solvers.solve import solve
@@ -96,3 +98,12 @@ def test_a_real_cut_is_solved_to_proved_optimality(data: Path) -> None:
     assert [solution.problem for solution in found.solutions] == ["sparse", "extension"]
     assert PartialPermutation().violation(found.solutions[1]["X"]) == 0.0
     assert len(found.correspondence) == 80
+
+
+def test_a_part_with_more_samples_than_the_full_surface_has_vertices_is_matched() -> None:
+    fine, coarse = (trimesh.creation.icosphere(subdivisions=level) for level in (3, 1))
+    stretched = np.array([1.0, 1.3, 1.7])
+    part, full = (Mesh(ball.vertices * stretched, ball.faces) for ball in (fine, coarse))
+    found = match(Pair.of(part, full, cache=None), IsometricMatching()).correspondence
+    assert found is not None
+    assert 0 < len(found) <= len(full.vertices) < 100

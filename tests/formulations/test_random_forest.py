@@ -249,3 +249,13 @@ def test_settings_and_examples_are_checked(examples: list[Example]) -> None:
         train_forest([examples[0], cut(other, other, (1, 0, 0), 0.6, "z0")], settings=SMALL)
     with pytest.raises(InputError, match="rows for"):
         replace(examples[0], truth=examples[0].truth[:3])
+
+
+def test_forests_that_vote_for_other_labels_have_other_names(method: RandomForest) -> None:
+    forest = method.forest
+    assert not isinstance(forest, str)
+    tree = forest.trees[0]
+    votes = tree.votes.copy()
+    votes.indices = votes.indices[::-1].copy()
+    other = replace(forest, trees=(replace(tree, votes=votes), *forest.trees[1:]))
+    assert repr(other) != repr(forest)

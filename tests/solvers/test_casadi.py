@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -256,6 +256,9 @@ def test_kkt_points_of_the_game_are_feasible_in_the_integer_problem_with_equal_o
     assert violation(rewritten.problem, forward) < 1e-6
     assert rewritten.problem.objective.value(forward) == pytest.approx(problem.objective.value({"u": u}), abs=1e-12)
     assert np.array_equal(rewritten.inverse(forward)["u"], u)
+    raised = Problem("raised", replace(problem.objective, constant=5.0), *problem.memberships)
+    value = KktMixedInteger().apply(raised).problem.objective.value(forward)
+    assert value == pytest.approx(raised.objective.value({"u": u}), abs=1e-12)
 
 
 def test_mixed_binary_set_and_linear_term_keep_their_promises() -> None:

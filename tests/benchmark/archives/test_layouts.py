@@ -230,6 +230,8 @@ def test_a_test_set_is_matched_and_submitted(
     assert [spec.truth for spec in read_plan(tmp_path / "plan.toml").pairs()] == [None, None]
     answer = nonrigid("bench", tmp_path / "plan.toml", "--out", tmp_path / "res", "--quiet")
     assert (answer.code, test_set.name in answer.out) == (0, True)
+    assert "without a match" not in answer.out
+    assert "cannot be shown" not in nonrigid("report", tmp_path / "res", "--jobs", "1").out
     answer = nonrigid("data", "submit", tmp_path / "res", "--out", tmp_path / "mine.zip")
     assert answer.code == 0, answer.err
     with zipfile.ZipFile(tmp_path / "mine.zip") as packed:
