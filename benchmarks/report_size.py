@@ -12,6 +12,7 @@ import os
 import sys
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -92,7 +93,7 @@ def fill(folder: Path, count: int) -> None:
                 shown = generator.random(len(kept)) < (1.0 if rank < 4 else 0.02)
                 points = SurfacePoints(np.where(shown, truth.faces, -1), truth.barycentric)
                 errors = generator.exponential(0.05, int(shown.sum()))
-                write_points(store.points_file(run), matched_points(points, errors))
+                write_points(store.points_file(run), replace(matched_points(points), errors=errors))
                 store.write_run(_record(run, name, label, backend, best, errors, len(kept), generator))
                 labels[run] = label
     store.write_index({"title": "Made up", "dataset": "shrec16", "metric": "dijkstra", "runs": labels})
